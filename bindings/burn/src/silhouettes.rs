@@ -54,8 +54,8 @@ impl<S: Softness> Silhouettes<S> {
         of_one(self.coverage(), vertices)
     }
 
-    /// The `IoU` loss of the silhouettes of `vertices` `[views, vertices, 3]` against a `target` `[1 or views, height,
-    /// width]`: 1 minus intersection over union per view, `[views]`. Only the vertices receive gradients.
+    /// The `IoU` loss of the silhouettes of `vertices` `[views, vertices, 3]` against a `target` `[1 or views, height, width]`: 1
+    /// minus intersection over union per view, `[views]`. Only the vertices receive gradients.
     ///
     /// # Panics
     ///
@@ -73,8 +73,8 @@ impl<S: Softness> Silhouettes<S> {
         of_two(self.loss(Kind::Mse), [vertices, target.inner()])
     }
 
-    /// Derivative of the silhouette as `vertices` move along `direction`, both `[views, vertices,
-    /// 3]`: `[views, height, width]`, without gradients.
+    /// Derivative of the silhouette as `vertices` move along `direction`, both
+    /// `[views, vertices, 3]`: `[views, height, width]`, without gradients.
     ///
     /// # Panics
     ///

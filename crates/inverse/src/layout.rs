@@ -10,7 +10,7 @@ const ABOVE_FLOOR: f64 = 0.05;
 const FLOOR_PX: f64 = 0.03;
 const KNOTS: usize = 3;
 
-/// Layout of the vector φ that stands for a softness, and so can be learned.
+/// Layout of the vector φ that represents a softness, and so can be learned.
 ///
 /// First come the knots of the schedule, if the scale moves or is learned separately. Then the parameters of the softness, at scale 1 and
 /// without the logarithm of the scale if a schedule replaces it. Then all parameters of the surrogate, which keeps its own ratio to the

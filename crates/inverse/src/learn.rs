@@ -72,7 +72,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
     ///
     /// # Errors
     ///
-    /// If learning cannot go on.
+    /// If learning cannot continue.
     pub fn step(&mut self) -> anyhow::Result<Option<Record>> {
         self.step_shared(&Alone)
     }
@@ -81,7 +81,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
     ///
     /// # Errors
     ///
-    /// If learning cannot go on.
+    /// If learning cannot continue.
     pub fn step_shared(&mut self, ranks: &dyn Ranks) -> anyhow::Result<Option<Record>> {
         Ok(self.outer_loop.step_shared(&self.instances, &mut self.progress, ranks)?)
     }

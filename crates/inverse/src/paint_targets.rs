@@ -48,9 +48,9 @@ impl<B: Backend> PaintTargets<B> {
     /// The mean squared difference `[1]` of colours where both a view and an image show the object, for an image
     /// `[views, 4, size, size]` that a `ColourRenderer` drew over black, with the faces' share last.
     ///
-    /// With S the share, S c the drawn colour, a the weight and a C the known colour over black, this is `Σ (a S c - S
-    /// a C)² / (3 Σ a)`: a pixel is weighted by `(a S)²`, no division can fail, and neither the view's nor the image's
-    /// background contributes.
+    /// With S the share, S c the drawn colour, a the weight and a C the known colour over black,
+    /// this is `Σ (a S c - S a C)² / (3 Σ a)`: a pixel is weighted by `(a S)²`, no division can
+    /// fail, and neither the view's nor the image's background contributes.
     pub fn loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
         let drawn = image.clone().narrow(1, 0, 3);
         let share = image.narrow(1, 3, 1);

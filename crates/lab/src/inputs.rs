@@ -17,8 +17,8 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Every file named by a word of a command line, by itself or as a part of it (`--flag=FILE`, `FILE,FILE`, `"FILE
-    /// --flag 1"`), except after the flags of results. New flags are therefore protected without further code.
+    /// Every file named by a word of a command line, by itself or as a part of it (`--flag=FILE`, `FILE,FILE`,
+    /// `"FILE --flag 1"`), except after the flags of results. New flags are therefore protected without further code.
     ///
     /// Files in a folder that a flag names are not included: a result never replaces a file that no manifest lists.
     pub fn of_words(words: &[OsString], outputs: &[&str]) -> Self {

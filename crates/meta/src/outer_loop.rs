@@ -41,7 +41,7 @@ pub struct Validation {
     pub patience: Option<usize>,
 }
 
-/// Learning cannot go on.
+/// An error that ends learning.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LearnError {
     /// No gradient of the batch is finite.

@@ -26,8 +26,8 @@
 //!
 //! # A fit
 //!
-//! A [`VertexModel`] is a mesh whose vertices are the parameter of a burn module, for burn's optimisers. [`Views`] reads masks `[views, H,
-//! W]` and cameras of a folder; here both are generated. A width that narrows finds first the shape, then its edges.
+//! A [`VertexModel`] is a mesh whose vertices are the parameter of a burn module, for burn's optimisers. [`Views`] reads masks
+//! `[views, H, W]` and cameras of a folder; here both are generated. A width that narrows finds first the shape, then its edges.
 //!
 //! ```
 //! # use softrast::{mesh::{fox, icosphere}, prelude::*, tensor::{Autodiff, NdArray, burn::optim::AdamConfig}};

@@ -106,8 +106,8 @@ impl InverseProblem for Occlusion {
         scene.loss(image.flatten(2, 3))
     }
 
-    /// The transfer has to cross 3.5 world units in ten steps. Front quads found out of 50 with `evaluate --variant
-    /// transfer --size 32 --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 % at 0.7 and at 1.4.
+    /// The transfer has to cross 3.5 world units in ten steps. Front quads found out of 50 with
+    /// `evaluate --variant transfer --size 32 --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 % at 0.7 and at 1.4.
     fn defaults(&self) -> SolveConfig {
         match self.variant {
             Variant::Original => SolveConfig { size: 64, steps: 100, learning_rate: 0.03 },

@@ -103,8 +103,8 @@ impl<B: RasterBackend> Learner<B> {
         self.apply(gradients, rates, start)
     }
 
-    /// One step on a batch that comes in `parts` of equal size, distributed over the processes of `world`: rank r of n computes parts r, r
-    /// + n, ... The means over the parts are summed in their order, so that the result does not depend on the number of processes.
+    /// One step on a batch that comes in `parts` of equal size, distributed over the processes of `world`: each of n processes computes
+    /// every n-th part. The means over the parts are summed in their order, so that the result does not depend on the number of processes.
     ///
     /// Batch norms see one part at a time.
     pub(crate) fn step_in_parts(

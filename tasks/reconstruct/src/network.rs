@@ -45,7 +45,7 @@ impl Width {
 ///
 /// Three 5×5 convolutions with stride 2 to 64, 128 and 256 channels, each with a batch norm; fully
 /// connected layers of 1024, 1024 and 512 (the code), then of 1024 and 2048, and from there to a
-/// centre and to all vertices. ReLUs between all of them. Source: docs/notes.md, Reconstruction.
+/// centre and to all vertices. Rectifiers between all of them. Source: docs/notes.md, Reconstruction.
 #[derive(Module, Debug)]
 pub struct Network<B: Backend> {
     convolutions: Vec<Conv2d<B>>,

@@ -15,9 +15,9 @@ use crate::{
 /// Shapes in the public files of earlier papers.
 ///
 /// A class has two files per split: `<class>_<split>_images.npz` with `[shapes, 24, 4, 64, 64]`
-/// bytes (24 views of red, green, blue and alpha) and `<class>_<split>_voxels.npz` with `[shapes,
-/// 32, 32, 32]` truth values. View k is taken from azimuth -15 k degrees; for the order of the
-/// voxels see [`Voxels`]. Rows are read on demand.
+/// bytes (24 views of red, green, blue and alpha) and `<class>_<split>_voxels.npz` with
+/// `[shapes, 32, 32, 32]` truth values. View k is taken from azimuth -15 k degrees; for the order
+/// of the voxels see [`Voxels`]. Rows are read on demand.
 ///
 /// Source: the layout of Kato et al. 2018; docs/notes.md, Reconstruction.
 #[derive(Debug)]

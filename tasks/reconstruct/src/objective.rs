@@ -64,9 +64,9 @@ impl<B: RasterBackend> Objective<B> {
         self.smoothness.loss(vertices)
     }
 
-    /// `1 - IoU` of soft silhouettes, `[1]`, for the shapes with `vertices` `[2 pairs, 3,
-    /// vertices]` that were predicted from `pictures` `[2 pairs, 4, 64, 64]` in these views: all
-    /// first pictures of the pairs, then all second ones.
+    /// `1 - IoU` of soft silhouettes, `[1]`, for the shapes with `vertices`
+    /// `[2 pairs, 3, vertices]` that were predicted from `pictures` `[2 pairs, 4, 64, 64]` in these
+    /// views: all first pictures of the pairs, then all second ones.
     ///
     /// Either prediction of a pair is drawn from both of its views, four silhouettes; the mean is over
     /// all of them. Source: docs/notes.md, Reconstruction.
@@ -118,8 +118,8 @@ const FLATNESS: f64 = 5e-4;
 /// Smoothness loss of many shapes with the same closed topology.
 #[derive(Clone, Debug)]
 pub struct Smoothness<B: Backend> {
-    /// Column v maps to the offset of vertex v from the mean of its neighbours, `[vertices,
-    /// vertices]`. A dense product costs less than gathering neighbours if there are many shapes.
+    /// Column v maps to the offset of vertex v from the mean of its neighbours, `[vertices, vertices]`. A
+    /// dense product costs less than gathering neighbours if there are many shapes.
     away: Tensor<B, 2>,
     /// Four vertices of each hinge, all first ones before all second ones: `[4 hinges]`.
     corners: Tensor<B, 1, Int>,

@@ -22,8 +22,8 @@ pub struct Feedback {
     pub steps: usize,
     /// Logarithm of the number of steps from progress 0 to 1 at constant error, in a run of `steps` or more.
     pub passage: f64,
-    /// Exponent of the slowdown while the error falls: the pace is multiplied by `(recent /
-    /// earlier)^patience`, two running means of the error over about 5 and 20 steps.
+    /// Exponent of the slowdown while the error falls: the pace is multiplied by
+    /// `(recent / earlier)^patience`, two running means of the error over about 5 and 20 steps.
     pub patience: f64,
     /// Logarithm of the error above which a run at progress 1 is stuck; it is compared with the least error since the last start.
     pub stuck: f64,

@@ -19,7 +19,7 @@ use crate::softness_file::stored::{
 pub struct Surrogate<S = EdgeSoftness> {
     /// The softness.
     pub softness: S,
-    /// Its parameters φ, as many as [`Softness::parameters`] says.
+    /// Its parameters φ; their number is [`Softness::parameters`].
     pub phi: Vec<f64>,
 }
 
@@ -40,7 +40,7 @@ pub struct Surrogate<S = EdgeSoftness> {
 pub struct ScheduledSoftness<S = EdgeSoftness> {
     /// The softness.
     pub softness: S,
-    /// Its parameters φ, as many as [`Softness::parameters`] says.
+    /// Its parameters φ; their number is [`Softness::parameters`].
     pub phi: Vec<f64>,
     /// Schedule of its width; without one the width is fixed.
     #[serde(alias = "path", default, skip_serializing_if = "Option::is_none")]

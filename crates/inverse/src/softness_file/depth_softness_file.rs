@@ -11,7 +11,7 @@ use super::stored::{SoftnessFileError, Stored, check_phi, learned, stored};
 pub struct DepthSoftnessFile {
     /// The depth softness.
     pub depth_softness: DepthSoftness,
-    /// Its parameters φ, as many as [`DepthSoftness::parameters`] says.
+    /// Its parameters φ; their number is [`DepthSoftness::parameters`].
     pub phi: Vec<f64>,
     /// Origin of the parameters, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -58,8 +58,8 @@ impl<B: RasterBackend> Scene<B> {
         self.image_with(theta, |seen| softness.silhouette(seen))
     }
 
-    /// The soft image `[views, 4, side, side]` with another renderer of silhouettes `[views, side,
-    /// side]`, given vertices `[views, vertices, 3]`.
+    /// The soft image `[views, 4, side, side]` with another renderer of silhouettes
+    /// `[views, side, side]`, given vertices `[views, vertices, 3]`.
     pub fn image_with(
         &self,
         theta: Tensor<B, 1>,
