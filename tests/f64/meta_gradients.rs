@@ -165,7 +165,7 @@ fn fused_errors<S: Softness>(softness: S, phi: &[f64], tolerance: f64) -> [f64; 
 fn both_ways_to_draw_have_the_same_meta_gradient() {
     let edge = EdgeSoftness::new(Family::Logistic);
     let moving = Method::new("logistic", ScheduledSoftness::decay(edge, SCALE, SCALE / 2.0));
-    let learning = moving.learning_tolerance(true);
+    let learning = moving.learning_tolerance();
     assert_eq!(learning, 1e-3);
     for (tolerance, bound) in [(FINE, 1e-4), (Rasterizer::TOLERANCE, 1e-2), (learning, 0.1)] {
         let logistic = fused_errors(Logistic, &logistic(), tolerance);

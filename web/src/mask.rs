@@ -64,7 +64,7 @@ impl<B: RasterBackend> MaskRun<B> {
     fn begin(&mut self) -> anyhow::Result<()> {
         let Some(&start) = self.starts.get(self.start) else { return Ok(()) };
         let pose = MaskPose { mask: self.mask.clone(), square: self.square, start, painted: None };
-        let problem = MaskPoses::new(&self.mesh, vec![pose.clone()], false);
+        let problem = MaskPoses::new(&self.mesh, vec![pose.clone()]);
         let run = Minimization::new(problem, vec![pose.clone()], &self.method, &self.config)?
             .with_pictures();
         self.run = Some((run, pose));

@@ -45,7 +45,10 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
         let own = problem.own_phi();
         let config = config.resolved(&method.softness, own.len())?;
         let layout = PhiLayout::learned(&method.softness, own, solve.steps, solve.size, &config);
-        let tolerance = method.learning_tolerance(config.differentiates());
+        let tolerance = match config.differentiates() {
+            true => method.learning_tolerance(),
+            false => method.tolerance(),
+        };
         let judge = match config.outer_loss {
             Some(OuterLoss::Hard | OuterLoss::Returned) => OuterImage::Hard,
             _ => OuterImage::Sharp(sharp(&problem, config.finer() * solve.size, &config).into()),

@@ -46,11 +46,9 @@ impl<S: Softness> Method<S> {
         self.tolerance.unwrap_or(Method::usual_tolerance(!self.softness.is_constant()))
     }
 
-    /// The largest error of a pixel while the softness is learned: by default at most 1e-3 if learning `differentiates` runs.
-    pub fn learning_tolerance(&self, differentiates: bool) -> f64 {
-        let usual = self.tolerance();
-        let most = if differentiates { usual.min(LEARNING_TOLERANCE) } else { usual };
-        self.tolerance.unwrap_or(most)
+    /// The largest error of a pixel while the softness is learned by differentiating runs: by default at most 1e-3.
+    pub fn learning_tolerance(&self) -> f64 {
+        self.tolerance.unwrap_or(self.tolerance().min(LEARNING_TOLERANCE))
     }
 }
 
@@ -64,11 +62,10 @@ mod tests {
     fn a_scale_that_moves_is_drawn_less_exactly_unless_derivatives_are_taken() {
         let softness = EdgeSoftness::new(Family::Gauss);
         let moving = Method::new("gauss", ScheduledSoftness::decay(softness, 0.1, 0.001));
-        assert_eq!((moving.tolerance(), moving.learning_tolerance(false)), (1e-2, 1e-2));
-        assert_eq!(moving.learning_tolerance(true), LEARNING_TOLERANCE);
+        assert_eq!([moving.tolerance(), moving.learning_tolerance()], [1e-2, LEARNING_TOLERANCE]);
         let still = Method::new("gauss", ScheduledSoftness::constant(softness, 0.1));
-        assert_eq!([still.tolerance(), still.learning_tolerance(true)], [Rasterizer::TOLERANCE; 2]);
+        assert_eq!([still.tolerance(), still.learning_tolerance()], [Rasterizer::TOLERANCE; 2]);
         let asked = Method { tolerance: Some(0.05), ..moving };
-        assert_eq!([asked.tolerance(), asked.learning_tolerance(true)], [0.05; 2]);
+        assert_eq!([asked.tolerance(), asked.learning_tolerance()], [0.05; 2]);
     }
 }

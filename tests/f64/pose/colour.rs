@@ -1,7 +1,7 @@
 //! POSE with colour: the gradient of the loss compared with central differences.
 
 use pose::colour::Scene;
-use softrast_inverse::pose::PoseInstance;
+use softrast_inverse::{PoseProblem, pose::PoseInstance};
 use softrast_mesh::painted_fox;
 use softrast_meta::Objective;
 use softrast_raster::{RasterBackend, low_level::Rasterizer};
@@ -20,7 +20,8 @@ struct Three;
 fn scene<B: RasterBackend>() -> Scene<B> {
     let instances = [0, 1, 2].map(|seed| PoseInstance::seeded(seed, [15.0, 35.0]));
     let fox = painted_fox();
-    Scene::new(&fox, fox.colours().unwrap(), &instances, SIZE, true)
+    let problem = PoseProblem { optimise_fov: true, ..PoseProblem::new(&fox) };
+    Scene::new(&problem, fox.colours().unwrap(), &instances, SIZE)
 }
 
 impl<B: RasterBackend> Objective<B> for Three {

@@ -3,7 +3,10 @@
 //! Source: docs/notes.md, Values before any step. The mesh is third-party and not part of this repository.
 
 use pose::{PoseError, released24};
-use softrast_inverse::pose::{PoseInstance, PoseScene};
+use softrast_inverse::{
+    PoseProblem,
+    pose::{PoseInstance, PoseScene},
+};
 use softrast_raster::{iou_loss, low_level::Rasterizer};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{NdArray, Tensor};
@@ -28,7 +31,7 @@ fn sum(losses: Tensor<B, 1>) -> f64 {
 fn targets_and_losses_before_any_step_are_those_measured_before() {
     let mesh = paper_mesh("spot.obj");
     let instances = released24().unwrap();
-    let scene = PoseScene::<B>::new(&mesh, &instances, SIZE, false);
+    let scene = PoseScene::<B>::new(&PoseProblem::new(&mesh), &instances, SIZE);
     let target = scene.target();
     let coverage: f64 = target.clone().mean().into_scalar();
     assert_close("coverage of the targets", coverage, 0.25180, TOLERANCE);

@@ -1,6 +1,9 @@
 //! The gradient of the loss with respect to the pose compared with central differences, in f64.
 
-use softrast_inverse::pose::{PoseInstance, PoseScene};
+use softrast_inverse::{
+    PoseProblem,
+    pose::{PoseInstance, PoseScene},
+};
 use softrast_mesh::fox;
 use softrast_raster::{
     iou_loss,
@@ -31,7 +34,8 @@ fn losses(
 /// Compares all entries of θ `[views, columns]`, whose last column is the field of view if there are four.
 fn check(optimise_fov: bool) {
     let instances = [0, 1, 2].map(|seed| PoseInstance::seeded(seed, [15.0, 35.0]));
-    let scene = PoseScene::<A>::new(&fox(), &instances, SIZE, optimise_fov);
+    let problem = PoseProblem { optimise_fov, ..PoseProblem::new(&fox()) };
+    let scene = PoseScene::<A>::new(&problem, &instances, SIZE);
     let softness = EdgeSoftness::new(Family::Logistic);
     let phi = vector::<A>(&softness.default_phi(0.05));
     let rasterizer = Rasterizer { tolerance: 1e-9, ..Rasterizer::new(SIZE) };

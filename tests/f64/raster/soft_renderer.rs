@@ -227,3 +227,26 @@ fn a_hard_image_has_the_gradient_of_the_soft_one() {
     let known = hard_coverage(Projected::new(shaped(&vertices)), &faces, SIZE, 3);
     assert!(image.iter().zip(numbers(known)).all(|(a, b)| (a - b).abs() < 1e-12));
 }
+
+#[test]
+fn gradients_of_few_pixels_and_of_the_others_add_up_to_those_of_all() {
+    let (vertices, faces) = triangles(7, 60);
+    let renderer = renderer(EdgeSoftness::new(Family::Gauss), &faces, 0.01);
+    let gradient = |upstream: &dyn Fn(usize) -> f64| {
+        let vertices = Tensor::<Autodiff<B>, 3>::from_inner(shaped(&vertices)).require_grad();
+        let image = renderer.silhouette(Projected::new(vertices.clone()));
+        let upstream: Vec<f64> = (0..SIZE * SIZE).map(upstream).collect();
+        let upstream = vector::<B>(&upstream).reshape([1, SIZE as i64, SIZE as i64]);
+        let loss = (image * Tensor::from_inner(upstream)).sum();
+        numbers(vertices.grad(&loss.backward()).expect("the image depends on them"))
+    };
+    let is_one_of_few = |pixel: usize| pixel % 37 == 5;
+    let few = gradient(&|pixel| f64::from(u8::from(is_one_of_few(pixel))));
+    let others = gradient(&|pixel| f64::from(u8::from(!is_one_of_few(pixel))));
+    let all = gradient(&|_| 1.0);
+    assert!(few.iter().any(|g| g.abs() > 1e-3) && few.contains(&0.0));
+    for ((few, others), all) in few.iter().zip(&others).zip(&all) {
+        assert!((few + others - all).abs() < 1e-12 * (1.0 + all.abs()), "{few} {others} {all}");
+    }
+    assert!(gradient(&|_| 0.0).iter().all(|&g| g == 0.0));
+}

@@ -74,7 +74,8 @@ impl Views {
         let mut moves = vec![turn; 6];
         moves.extend(optimise_fov.then_some(turn / OF_ZOOM));
         let instances = vec![pose.clone(); 2 * moves.len()];
-        let problem = MaskPoses::new(mesh, instances.clone(), optimise_fov);
+        let mut problem = MaskPoses::new(mesh, instances.clone());
+        problem.optimise_fov = optimise_fov;
         let scene = problem.scene(&instances, SAMPLES * size);
         Self { problem, instances, scene, size, moves }
     }

@@ -47,15 +47,16 @@ pub struct MaskPoses {
     /// The mesh in its frame.
     mesh: Mesh,
     frame: Frame,
-    optimise_fov: bool,
+    /// Whether the field of view is optimised too, from that of the start.
+    pub optimise_fov: bool,
     instances: Vec<MaskPose>,
 }
 
 impl MaskPoses {
     /// Poses of a mesh; entry `k` is the instance of seed `k`.
-    pub fn new(mesh: &Mesh, instances: Vec<MaskPose>, optimise_fov: bool) -> Self {
+    pub fn new(mesh: &Mesh, instances: Vec<MaskPose>) -> Self {
         let frame = Frame::of_mesh(mesh);
-        Self { mesh: frame.mesh(mesh), frame, optimise_fov, instances }
+        Self { mesh: frame.mesh(mesh), frame, optimise_fov: false, instances }
     }
 }
 

@@ -46,7 +46,7 @@ impl InverseProblem for PoseProblem {
     }
 
     fn scene<B: RasterBackend>(&self, instances: &[PoseInstance], size: usize) -> PoseScene<B> {
-        PoseScene::new(&self.mesh, instances, size, self.optimise_fov)
+        PoseScene::new(self, instances, size)
     }
 
     fn faces(&self) -> Option<Arc<[[u32; 3]]>> {

@@ -6,7 +6,8 @@ use softrast_raster::{
 };
 use softrast_tensor::{Tensor, numbers, tensor};
 
-use crate::{Targets, pose::PoseInstance};
+use super::{PoseInstance, PoseProblem};
+use crate::Targets;
 
 /// Least distance of a camera from the origin, as a multiple of that of the farthest vertex.
 const CLEARANCE: f64 = 1.05;
@@ -32,14 +33,15 @@ pub struct PoseScene<B: RasterBackend> {
 }
 
 impl<B: RasterBackend> PoseScene<B> {
-    /// Instances of `mesh` on images of `size` × `size` pixels.
+    /// Instances of a problem on images of `size` × `size` pixels.
     ///
-    /// The start's field of view is used unchanged, and optimised if `optimise_fov`.
+    /// The field of view of each start is used unchanged, unless the problem optimises it.
     ///
     /// # Panics
     ///
     /// If there is no instance.
-    pub fn new(mesh: &Mesh, instances: &[PoseInstance], size: usize, optimise_fov: bool) -> Self {
+    pub fn new(problem: &PoseProblem, instances: &[PoseInstance], size: usize) -> Self {
+        let PoseProblem { mesh, optimise_fov, .. } = problem;
         let views = instances.len();
         assert!(views > 0, "a scene needs an instance");
         let orbits = |of: fn(&PoseInstance) -> Orbit| instances.iter().map(of).collect();
@@ -57,7 +59,7 @@ impl<B: RasterBackend> PoseScene<B> {
         let targets = Orbit::tensors::<B>(&ends, &device);
         let starts = Orbit::tensors::<B>(&starts, &device);
         let [pose, fov] = [(0, 3), (3, 1)].map(|(start, n)| starts.clone().narrow(1, start, n));
-        let (start, fov) = match optimise_fov {
+        let (start, fov) = match *optimise_fov {
             true => (Tensor::cat(vec![pose, fov * 0.5], 1), None),
             false => (pose, Some(fov)),
         };

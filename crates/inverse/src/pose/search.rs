@@ -267,11 +267,17 @@ impl Search {
             return poses;
         }
         let instances = target.poses(poses.iter().map(|&(camera, _)| camera), true);
-        let problem = MaskPoses::new(mesh, instances.clone(), self.optimise_fov);
+        let problem = self.problem(mesh, &instances);
         let scene = problem.scene::<HostBackend>(&instances, COARSE_SIZE);
         let image = problem.hard_image(&scene, problem.start(&scene));
         let losses = numbers(problem.image_loss(&scene, image));
         poses.into_iter().zip(losses).map(|((camera, _), loss)| (camera, loss)).collect()
+    }
+
+    fn problem(&self, mesh: &Mesh, poses: &[MaskPose]) -> MaskPoses {
+        let mut problem = MaskPoses::new(mesh, poses.to_vec());
+        problem.optimise_fov = self.optimise_fov;
+        problem
     }
 
     /// Settings of the high-resolution stage.
@@ -290,7 +296,7 @@ impl Search {
         begun: usize,
         visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<(Pinhole, f64)>> {
-        let problem = MaskPoses::new(mesh, poses.clone(), self.optimise_fov);
+        let problem = self.problem(mesh, &poses);
         let mut best = vec![None; poses.len()];
         minimize::<_, B>(&problem, &poses, method, stage, |iterate: &Iterate, scene| {
             let now = scene.found(iterate.theta.clone(), &poses);

@@ -1,8 +1,7 @@
 use softrast_inverse::{
-    SoftnessAt,
+    PoseProblem, SoftnessAt,
     pose::{ColouredViews, PoseInstance, PoseScene, VertexColours, split_coverage},
 };
-use softrast_mesh::Mesh;
 use softrast_raster::{Orbit, Projected, RasterBackend, project, vertices};
 use softrast_softness::Softness;
 use softrast_tensor::Tensor;
@@ -17,19 +16,19 @@ pub struct Scene<B: RasterBackend> {
 }
 
 impl<B: RasterBackend> Scene<B> {
-    /// Instances of a mesh whose vertices have these `colours`, on images of `size` × `size` pixels; see [`PoseScene::new`].
+    /// Instances of a problem, the vertices of whose mesh have these `colours`, on images of `size` × `size` pixels; see [`PoseScene::new`].
     ///
     /// # Panics
     ///
     /// If there is no instance, or a vertex has no colour.
     pub fn new(
-        mesh: &Mesh,
+        problem: &PoseProblem,
         colours: &[[f64; 3]],
         instances: &[PoseInstance],
         size: usize,
-        optimise_fov: bool,
     ) -> Self {
-        let silhouettes = PoseScene::new(mesh, instances, size, optimise_fov);
+        let mesh = &problem.mesh;
+        let silhouettes = PoseScene::new(problem, instances, size);
         let coat = VertexColours::new(colours, mesh.faces().into());
         let device = Default::default();
         let cameras: Vec<Orbit> = instances.iter().map(|instance| instance.target).collect();

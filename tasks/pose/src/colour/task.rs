@@ -37,7 +37,7 @@ impl InverseProblem for Coloured {
 
     fn scene<B: RasterBackend>(&self, instances: &[PoseInstance], size: usize) -> Scene<B> {
         let problem = self.pose.problem();
-        Scene::new(&problem.mesh, &self.colours, instances, size, problem.optimise_fov)
+        Scene::new(problem, &self.colours, instances, size)
     }
 
     fn faces(&self) -> Option<Arc<[[u32; 3]]>> {
