@@ -8,7 +8,7 @@ pub(crate) const PAPER: Paper = Paper {
     runs: [200, 5],
     note: "Paper's unit: the sum over 24 pairs of the method's own soft IoU loss, and a third of the sum of squared distances\nof unit \
            directions. Its starts are 15 to 35 degrees away, ours 35 to 55. Its baselines end a decay at 1e-7, where\nthey have long lost \
-           the pose (docs/studies/measured.md); ours stop where the hard image is best. Its camera keeps a wrong\nfield of view, ours a known one.",
+           the pose (docs/log/measured.md); ours stop where the hard image is best. Its camera keeps a wrong\nfield of view, ours a known one.",
     table3: &[
         ("mlp", [[1.1, 0.01], [2.17, 0.14]]),
         ("gauss", [[15.3, 0.19], [15.98, 0.14]]),
