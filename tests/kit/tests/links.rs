@@ -57,7 +57,22 @@ fn every_section_of_the_notes_that_is_cited_exists() {
     assert!(wrong.is_empty(), "no such section of docs/notes.md:\n{}", wrong.join("\n"));
 }
 
-/// The reason why a link on a page is invalid, if it is.
+#[test]
+fn the_summary_of_the_book_lists_every_page_once() {
+    let docs = root().join("docs");
+    let summary = fs::read_to_string(docs.join("SUMMARY.md")).unwrap();
+    let mut listed = links(&summary);
+    listed.sort();
+    let mut pages: Vec<String> = files(&docs, "md")
+        .iter()
+        .map(|page| page.strip_prefix(&docs).unwrap().display().to_string().replace('\\', "/"))
+        .filter(|page| page != "SUMMARY.md")
+        .collect();
+    pages.sort();
+    assert_eq!(listed, pages);
+}
+
+/// Why a link on a page leads nowhere, if it does not.
 fn fault(page: &Path, link: &str) -> Option<String> {
     let on_the_web = ON_THE_WEB.iter().find_map(|start| link.strip_prefix(start));
     let is_elsewhere = ["http:", "https:", "mailto:", "data:"].iter().any(|x| link.starts_with(x));
