@@ -72,6 +72,25 @@ fn the_summary_of_the_book_lists_every_page_once() {
     assert_eq!(listed, pages);
 }
 
+#[test]
+fn pages_of_the_book_link_within_it_or_to_the_web() {
+    let docs = root().join("docs");
+    let mut outside = Vec::new();
+    for page in files(&docs, "md") {
+        let folder = page.parent().unwrap().strip_prefix(&docs).unwrap();
+        for link in links(&fs::read_to_string(&page).unwrap()) {
+            // Folders below `docs` are one deep.
+            if link.starts_with("../../")
+                || (folder.as_os_str().is_empty() && link.starts_with("../"))
+            {
+                outside.push(format!("  {}: {link}", shown(&page)));
+            }
+        }
+    }
+    let found = outside.join("\n");
+    assert!(outside.is_empty(), "take the address of the repository on the web:\n{found}");
+}
+
 /// Why a link on a page leads nowhere, if it does not.
 fn fault(page: &Path, link: &str) -> Option<String> {
     let on_the_web = ON_THE_WEB.iter().find_map(|start| link.strip_prefix(start));
