@@ -10,8 +10,11 @@ mod meshes;
 mod op;
 mod pose;
 mod renderer;
+mod shape;
 mod softness;
 mod taped;
+mod views;
+mod watched;
 
 use pyo3::prelude::*;
 
@@ -28,7 +31,9 @@ mod _native {
         op::{Op, iou_loss, mse_loss, orbit_matrix, perspective},
         pose::{find_pose, load_mask},
         renderer::{Prepared, Renderer, hard_silhouette},
+        shape::{fit_mesh, paint},
         softness::{Softness, families, learned_names},
+        views::{load_views, view_iou, view_psnr},
     };
 
     #[pymodule_init]

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use softrast_mesh::{Mesh, MeshError};
+use softrast_mesh::Mesh;
 
 use crate::guard::{guarded, refused};
 
 /// Positions `[V, 3]` (float64), faces `[F, 3]` (int64), and colours `[V, 3]` in [0, 1] if there are any.
-type Parts<'py> =
+pub(crate) type Parts<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, Option<Bound<'py, PyArray2<f64>>>);
 
 /// Reads OBJ, PLY, STL, OFF, GLB or glTF: positions, faces, and colours or None.
@@ -27,17 +27,8 @@ pub(crate) fn save_mesh(
     faces: PyReadonlyArray2<'_, i64>,
     colours: Option<PyReadonlyArray2<'_, f64>>,
 ) -> PyResult<()> {
-    let (positions, faces) = (triples(&positions, "positions")?, numbers(&faces)?);
-    let colours = colours.map(|colours| triples(&colours, "colours")).transpose()?;
-    let write = || -> Result<(), MeshError> {
-        let mesh = Mesh::new(positions, faces)?;
-        let mesh = match colours {
-            Some(colours) => mesh.with_colours(colours)?,
-            None => mesh,
-        };
-        mesh.save(path)
-    };
-    guarded(py, write)?.map_err(refused)
+    let mesh = mesh_of(&positions, &faces, colours.as_ref())?;
+    guarded(py, || mesh.save(path))?.map_err(refused)
 }
 
 /// The fox that the examples draw.
@@ -57,7 +48,7 @@ pub(crate) fn icosphere(py: Python<'_>, subdivisions: u32) -> PyResult<Parts<'_>
     parts(py, &softrast_mesh::icosphere(subdivisions))
 }
 
-fn parts<'py>(py: Python<'py>, mesh: &Mesh) -> PyResult<Parts<'py>> {
+pub(crate) fn parts<'py>(py: Python<'py>, mesh: &Mesh) -> PyResult<Parts<'py>> {
     let rows =
         |rows: &[[f64; 3]]| PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), 3]);
     let faces: Vec<i64> = mesh.faces().as_flattened().iter().map(|&v| i64::from(v)).collect();
@@ -65,12 +56,15 @@ fn parts<'py>(py: Python<'py>, mesh: &Mesh) -> PyResult<Parts<'py>> {
     Ok((rows(mesh.positions())?, faces, mesh.colours().map(rows).transpose()?))
 }
 
-/// The mesh of positions `[V, 3]` and faces `[F, 3]`.
+/// The mesh of positions `[V, 3]`, faces `[F, 3]` and, if there are any, colours `[V, 3]` in [0, 1].
 pub(crate) fn mesh_of(
     positions: &PyReadonlyArray2<'_, f64>,
     faces: &PyReadonlyArray2<'_, i64>,
+    colours: Option<&PyReadonlyArray2<'_, f64>>,
 ) -> PyResult<Mesh> {
-    Mesh::new(triples(positions, "positions")?, numbers(faces)?).map_err(refused)
+    let mesh = Mesh::new(triples(positions, "positions")?, numbers(faces)?).map_err(refused)?;
+    let Some(colours) = colours else { return Ok(mesh) };
+    mesh.with_colours(triples(colours, "colours")?).map_err(refused)
 }
 
 /// Faces as vertex numbers.

@@ -1,30 +1,22 @@
 //! Masks, and the camera from which a mesh has the silhouette of one.
 
-use std::{
-    path::PathBuf,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-        mpsc::{self, RecvTimeoutError},
-    },
-    thread,
-    time::Duration,
-};
+use std::path::PathBuf;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use softrast_inverse::pose::PoseSearch;
+use softrast_inverse::{
+    pose::{FoundPose, PoseSearch},
+    silhouette_pixels,
+};
 use softrast_raster::{ImageSize, Pinhole};
 use softrast_tensor::NdArray;
-use softrast_views::Picture;
+use softrast_views::{Picture, mask_iou};
 
 use crate::{
-    guard::{caught, guarded, refused},
+    guard::{guarded, refused},
     meshes::mesh_of,
+    watched::{Watch, watched},
 };
-
-/// Time after which Ctrl-C is seen.
-const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
 
 /// R row by row, t, and overlap over union.
 type Found = ([[f64; 3]; 3], [f64; 3], f64);
@@ -39,7 +31,8 @@ pub(crate) fn load_mask(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyA
 }
 
 /// The poses from which a mesh has the silhouette of a mask `[height, width]`, the best first, through a lens: focal lengths and the
-/// principal point, in pixels from the corner of the picture. `visit` gets the number of each step, how many there are and the least loss.
+/// principal point, in pixels from the corner of the picture. `visit` gets the number of each step, how many there are and the least loss. Also whether the
+/// search was not interrupted; where it was, the one pose is the best until then.
 #[pyfunction]
 pub(crate) fn find_pose(
     py: Python<'_>,
@@ -49,9 +42,9 @@ pub(crate) fn find_pose(
     lens: [f64; 4],
     start: Option<([[f64; 3]; 3], [f64; 3])>,
     visit: Option<Py<PyAny>>,
-) -> PyResult<Vec<Found>> {
+) -> PyResult<(Vec<Found>, bool)> {
     let [fx, fy, cx, cy] = lens;
-    let mesh = mesh_of(&positions, &faces)?;
+    let mesh = mesh_of(&positions, &faces, None)?;
     let &[height, width] = mask.shape() else { unreachable!("two axes") };
     if height == 0 || width == 0 {
         return Err(refused(format!("the mask is [{height}, {width}], expected pixels")));
@@ -62,41 +55,28 @@ pub(crate) fn find_pose(
     let camera =
         Pinhole { rotation, translation, focal: [fx, fy], centre: [cx, cy], size: mask.size() };
     camera.check().map_err(refused)?;
-    let (shown, mut seen) = mpsc::channel();
-    let ended = Arc::new(AtomicBool::new(false));
     let started = start.is_some();
-    // On a thread of its own, which ends at its next step: what comes before the first one takes seconds for a large mesh.
-    let search = thread::spawn({
-        let ended = ended.clone();
-        move || {
-            caught(move || {
-                let search = PoseSearch::new(&mesh, camera);
-                let search = if started { search.starting_at(&camera) } else { search };
-                let steps = search.steps(&mask);
-                let each = move |step: usize, loss: f64| {
-                    anyhow::ensure!(!ended.load(Ordering::Relaxed), "the search was ended");
-                    Ok(shown.send((step, steps, loss))?)
-                };
-                search.progress(each).run::<NdArray>(&mask).map_err(|error| format!("{error:#}"))
-            })
+    let work = move |watch: Watch| {
+        let mut best = None;
+        let search = PoseSearch::new(&mesh, camera);
+        let search = if started { search.starting_at(&camera) } else { search };
+        let steps = search.steps(&mask);
+        let each = |step: usize, loss: f64, pose: &Pinhole| {
+            best = Some(*pose);
+            watch.step(step, steps, loss)
+        };
+        let found = search.progress_with_pose(each).run::<NdArray>(&mask);
+        match (found, best) {
+            (Err(_), Some(camera)) if watch.is_ended() => {
+                let iou = mask_iou(&silhouette_pixels(&mesh, &camera), &mask);
+                Ok(vec![FoundPose { camera, iou, psnr: None }])
+            }
+            (found, _) => found,
         }
-    });
-    loop {
-        let (step, again) = py.detach(move || (seen.recv_timeout(BETWEEN_SIGNALS), seen));
-        seen = again;
-        let visited = py.check_signals().and_then(|()| match (&visit, step) {
-            (Some(visit), Ok(step)) => visit.call1(py, step).map(drop),
-            _ => Ok(()),
-        });
-        if let Err(error) = visited {
-            ended.store(true, Ordering::Relaxed);
-            return Err(error);
-        }
-        if step == Err(RecvTimeoutError::Disconnected) {
-            break;
-        }
-    }
-    let found = py.detach(|| search.join()).map_err(|_| refused("the search has no result"))?;
-    let poses = found.and_then(|found| found).map_err(refused)?;
-    Ok(poses.iter().map(|pose| (pose.camera.rotation, pose.camera.translation, pose.iou)).collect())
+    };
+    let (poses, interrupted) = watched(py, visit, work)?;
+    let poses = poses
+        .iter()
+        .map(|FoundPose { camera, iou, .. }| (camera.rotation, camera.translation, *iou));
+    Ok((poses.collect(), !interrupted))
 }

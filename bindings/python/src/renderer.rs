@@ -39,6 +39,7 @@ pub(crate) struct Prepared {
 #[pymethods]
 impl Renderer {
     #[new]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
         faces: PyReadonlyArray2<'_, i64>,

@@ -155,6 +155,71 @@ def test_meshes_with_other_faces_draw_in_one_call():
         st.silhouettes(both[:1], seen)
 
 
+def test_gradients_of_padded_meshes_are_those_of_each():
+    positions, faces, _ = softrast.icosphere(1)
+    both = [softrast.Renderer(faces, (6, 5), softrast.Softness("logistic", 0.1)), silhouettes().renderer]
+    leaves = [torch.from_numpy(positions).float().requires_grad_(), CORNERS.clone().requires_grad_()]
+    see = lambda: [st.project(leaves[0], CAMERAS[:1]), st.project(leaves[1], CAMERAS)]
+    padded = torch.autograd.grad(st.silhouettes(both, see()).pow(2).sum(), leaves)
+    each = [torch.autograd.grad(st.silhouette(draw, seen).pow(2).sum(), leaf)[0] for draw, seen, leaf in zip(both, see(), leaves)]
+    assert all(torch.equal(a, b) for a, b in zip(padded, each))
+
+
+def test_colours_of_meshes_with_other_faces_draw_in_one_call():
+    positions, faces, _ = softrast.icosphere(1)
+    ball = softrast.ColourRenderer(faces, (6, 5), softrast.Softness("logistic", 0.1), [1.0, 4.0])
+    both = [ball, colours().renderer]
+    seen = [st.project(torch.from_numpy(positions).float(), CAMERAS[:1]), st.project(CORNERS, CAMERAS)]
+    values = [torch.from_numpy(positions[:, :2].copy()).float(), VALUES]
+    padded, packed = st.blends(both, seen, values, 0.5), st.blends(both, seen, values, 0.5, packed=True)
+    assert padded.shape == (2, 2, 3, 6, 5) and (padded[0, 1] == 0.0).all()
+    assert torch.equal(packed, torch.cat([padded[0, :1], padded[1]]))
+    assert torch.equal(padded[1], st.blend(both[1], seen[1], VALUES, 0.5))
+    with pytest.raises(ValueError, match="attributes must be one tensor for each of the 2 meshes, of as many channels"):
+        st.blends(both, seen, [values[0], VALUES[:, :1]])
+
+
+@pytest.mark.parametrize("half", [torch.float16, torch.bfloat16])
+def test_colours_and_losses_of_halves_are_computed_in_f32(half):
+    draw, values = colours(), VALUES.to(half).requires_grad_()
+    image = draw(CORNERS.to(half), values, torch.tensor([0.25, 0.5], dtype=half), cameras=CAMERAS)
+    assert torch.equal(image, draw(CORNERS.to(half).float(), values.detach().float(), torch.tensor([0.25, 0.5]), cameras=CAMERAS))
+    loss = st.mse_loss(image[:, 0], torch.zeros(1, 6, 5, dtype=half)).sum()
+    loss.backward()
+    assert loss.dtype == torch.float32 and values.grad.dtype == half and values.grad.abs().max() > 0.0
+
+
+def test_a_step_under_autocast_trains_the_layer_before():
+    layer, draw = torch.nn.Linear(3, 3), silhouettes()
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        moved = layer(CORNERS)
+        loss = st.iou_loss(draw(CORNERS + 0.1 * moved, CAMERAS), torch.ones(1, 6, 5)).mean()
+    loss.backward()
+    assert moved.dtype == torch.bfloat16 and loss.dtype == torch.float32
+    assert layer.weight.grad.abs().max() > 0.0 and torch.isfinite(layer.weight.grad).all()
+
+
+def test_attributes_and_pictures_of_any_layout_show_the_same():
+    draw = colours().renderer
+    seen, picture = st.project(CORNERS, CAMERAS), torch.rand(2, 3, 3, generator=torch.Generator().manual_seed(0))
+    places = VALUES * 0.5 + 0.2
+    expected = st.blend(draw, seen, places, 0.5, texture=picture)
+    turned = st.blend(draw, seen, places.T.contiguous().T, torch.tensor(0.5).expand(3), texture=picture.transpose(0, 2).contiguous().transpose(0, 2))
+    assert torch.equal(turned, expected)
+    leaf = places.clone().requires_grad_()
+    spread = st.blend(draw, seen, leaf.expand(2, 4, 2), 0.5, texture=picture)
+    assert torch.equal(spread, expected)
+    (both,) = torch.autograd.grad(spread.sum(), leaf)
+    (alone,) = torch.autograd.grad(st.blend(draw, seen, leaf, 0.5, texture=picture).sum(), leaf)
+    torch.testing.assert_close(both, alone)
+
+
+def test_one_target_is_compared_with_all_views():
+    image, target = torch.rand(3, 6, 5, generator=torch.Generator().manual_seed(0)), torch.rand(1, 6, 5, generator=torch.Generator().manual_seed(1))
+    for loss in (st.mse_loss, st.iou_loss):
+        assert torch.equal(loss(image, target), loss(image, target.expand(3, 6, 5).contiguous()))
+
+
 @pytest.mark.parametrize("call, message", [
     (lambda: st.silhouette(silhouettes().renderer, st.project(CORNERS, CAMERAS), torch.zeros(2)), r"phi must be \[1\], found \[2\]"),
     (lambda: st.mse_loss(torch.zeros(2, 3, 4), torch.zeros(2, 4, 3)), r"target \[1 or views, height, width\], found \[2, 3, 4\] and \[2, 4, 3\]"),

@@ -80,28 +80,48 @@ def test_an_error_of_the_progress_ends_the_search_and_is_raised():
     assert steps == [1, 2, 3]
 
 
-@pytest.mark.parametrize("after", [0.2, 3.0])
-def test_ctrl_c_ends_a_search(after):
+def ended(progress, ready):
+    """How a search in another process ends after Ctrl-C: its exit code and the seconds that it took."""
     script = f"""
 import signal, sys, numpy as np, softrast
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background is started with it ignored
 mask = softrast.load_mask({str(VIEWS / "images/03.png")!r})
 K = np.array([[130.0, 0, 62], [0, 131.0, 42.5], [0, 0, 1]])
-positions, faces, _ = softrast.icosphere(5)
-print("ready", flush=True)
+{ready}
 try:
-    for _ in range(100):
-        softrast.find_pose((positions, faces, None), mask, K)
+    found = softrast.find_pose(mesh, mask, K, progress={progress})
 except KeyboardInterrupt:
     sys.exit(7)
+sys.exit(1 if found.complete or found.iou < 0.3 or found.alternatives else 8)
 """
     process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "ready\n"
-    time.sleep(after)
+    time.sleep(0.2)
     start = time.perf_counter()
     process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=60) == 7
-    assert time.perf_counter() - start < 1.0
+    return process.wait(timeout=60), time.perf_counter() - start
+
+
+def test_ctrl_c_before_the_first_step_ends_a_search():
+    # What comes before the first step of this mesh takes seconds.
+    code, seconds = ended("None", "mesh = softrast.icosphere(8); print('ready', flush=True)")
+    assert code == 7 and seconds < 1.0
+
+
+def test_ctrl_c_keeps_the_best_pose_so_far():
+    code, seconds = ended("lambda step, *_: step == 20 and print('ready', flush=True)", "mesh = softrast.fox()")
+    assert code == 8 and seconds < 1.0
+
+
+def test_an_interrupted_search_has_the_best_pose_so_far():
+    mask, K, R, _ = scene()
+
+    def stop(step, count, loss):
+        if step == 70:
+            raise KeyboardInterrupt
+
+    found = softrast.find_pose(softrast.fox(), mask, K, progress=stop)
+    assert not found.complete and found.iou > 0.8 and found.alternatives == ()
 
 
 @pytest.mark.parametrize("call, message", [

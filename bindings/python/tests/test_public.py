@@ -99,4 +99,18 @@ painter = softrast.ColourRenderer(faces, 64, softrast.Softness.learned("pose"), 
 height: int = painter.size[0]
 image = softrast.blend(painter, seen, positions, background=[0.0, 0.0, 0.0])
 bound: float = renderer.error_bound + image.max() + alpha.max() + cameras.max()
+views: softrast.Views = softrast.load_views("views", masks="masks", invert=True)
+made = softrast.Views(views.masks, np.eye(3), views.R, views.t, names=["a"] * len(views))
+
+
+def visit(step: int, steps: int, loss: float) -> None:
+    print(step / steps, loss)
+
+
+found: softrast.FoundMesh = softrast.fit_mesh(made[::2], colours=True, start=softrast.icosphere(2), max_faces=1000, progress=visit)
+painted = softrast.paint(found.mesh, views[1], steps=10)
+pose: softrast.FoundPose = softrast.find_pose(found.mesh, views.masks[0], views.K[0], progress=visit)
+iou: NDArray[np.float64] = painted.iou + painted.psnr + found.iou_of(views)
+done: bool = pose.complete and found.complete
+found.save("a.glb")
 """

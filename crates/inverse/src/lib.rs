@@ -68,7 +68,7 @@ pub use learn_config::{Input, LearnConfig, OuterLoss, SIGMA};
 pub use method::Method;
 pub use minimize::{Minimization, minimize};
 pub use objectives::{Inner, Outer};
-pub use paint::paint;
+pub use paint::{paint, paint_until_stopped};
 pub use paint_targets::PaintTargets;
 pub use pose::PoseProblem;
 pub use problem::{InverseProblem, SolveConfig};

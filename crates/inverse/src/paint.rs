@@ -43,8 +43,23 @@ pub fn paint(
     mesh: &Mesh,
     views: &[PaintedView],
     config: &SolveConfig,
-    mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
+    visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
 ) -> anyhow::Result<Mesh> {
+    let (painted, stopped) = paint_until_stopped(mesh, views, config, visit)?;
+    stopped.map_or(Ok(painted), Err)
+}
+
+/// The mesh with colours as [`paint`] finds them. An error of `visit` ends the descent too, and is returned with the colours at that step.
+///
+/// # Errors
+///
+/// If there is no view, a mask is empty or full, or no camera has the mesh before it.
+pub fn paint_until_stopped(
+    mesh: &Mesh,
+    views: &[PaintedView],
+    config: &SolveConfig,
+    mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
+) -> anyhow::Result<(Mesh, Option<anyhow::Error>)> {
     let SolveConfig { size, steps, learning_rate } = *config;
     let square = |v: &PaintedView| v.view.mask.view_square().with_context(|| v.view.name.clone());
     let squares = views.iter().map(square).collect::<anyhow::Result<Vec<_>>>()?;
@@ -77,14 +92,18 @@ pub fn paint(
         let attributes = Attributes::new(colours.clone(), faces.clone());
         let image = renderer.image(Projected::from_inner(seen.clone()), &attributes, &background);
         let off = targets.loss(image);
-        visit(step, numbers(off.clone().inner())[0])?;
+        visit(step, numbers(off.clone().inner())[0]).map_err(|why| (theta.clone(), why))?;
         let loss = off + surface.laplacian(colours) * (SMOOTH / count as f64);
-        anyhow::Ok(leaf.grad(&loss.backward()).unwrap_or_else(|| theta.zeros_like()))
+        Ok(leaf.grad(&loss.backward()).unwrap_or_else(|| theta.zeros_like()))
     };
-    let theta = descend(&inner, start, gradient, |theta| theta.clamp(0.0, 1.0), |_, _, _| ())?;
+    let found = descend(&inner, start, gradient, |theta| theta.clamp(0.0, 1.0), |_, _, _| ());
+    let (theta, stopped) = match found {
+        Ok(theta) => (theta, None),
+        Err((theta, why)) => (theta, Some(why)),
+    };
     let found = numbers(theta);
     let colours = (0..count).map(|v| [0, 1, 2].map(|k| found[k * count + v])).collect();
-    Ok(mesh.with_colours(colours)?)
+    Ok((mesh.with_colours(colours)?, stopped))
 }
 
 /// The mean colour of all pixels that count; `None` if no pixel counts.

@@ -31,24 +31,8 @@ impl PaintedView {
     ///
     /// If the file is missing, not a picture, or not of the size of the mask; if no pixel has a weight.
     pub fn load(view: &View) -> anyhow::Result<Self> {
-        let of = || {
-            let [red, green, blue, opacity] = Picture::load_with_opacity(&view.picture)?;
-            let (found, mask) = (opacity.whole_size(), view.mask.whole_size());
-            ensure!(
-                found == mask,
-                "the picture has {} x {} pixels, but its mask {} x {}",
-                found.width,
-                found.height,
-                mask.width,
-                mask.height
-            );
-            let [red, green, blue, opacity] = match view.distortion {
-                Some(_) => undistorted(view, [red, green, blue, opacity]),
-                None => [red, green, blue, opacity],
-            };
-            Ok(Self::new(view.clone(), [red, green, blue], &opacity))
-        };
-        let painted = of().with_context(|| view.name.clone())?;
+        let [red, green, blue, opacity] = view.load_colours()?;
+        let painted = Self::new(view.clone(), [red, green, blue], &opacity);
         ensure!(
             painted.part.pixels().iter().any(|&part| part > 0.0),
             "{}: no pixel of the mask has a colour",
@@ -127,7 +111,31 @@ impl PaintedView {
     }
 }
 
-/// Colours and opacity of a picture without lens distortion: colours are weighted by opacity.
+impl View {
+    /// Red, green, blue and opacity of the picture file, undistorted, with as many pixels as the mask.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing, no picture, or not of the size of the mask.
+    pub fn load_colours(&self) -> anyhow::Result<[Picture; 4]> {
+        let of = || {
+            let colours = Picture::load_with_opacity(&self.picture)?;
+            let (found, mask) = (colours[3].whole_size(), self.mask.whole_size());
+            ensure!(
+                found == mask,
+                "the picture has {} x {} pixels, but its mask {} x {}",
+                found.width,
+                found.height,
+                mask.width,
+                mask.height
+            );
+            Ok(if self.distortion.is_some() { undistorted(self, colours) } else { colours })
+        };
+        of().with_context(|| self.name.clone())
+    }
+}
+
+/// Colours and opacity of a picture as a straight lens would have shown them: a colour counts as much as it is opaque.
 fn undistorted(view: &View, [colours @ .., opacity]: [Picture; 4]) -> [Picture; 4] {
     let width = opacity.size().width;
     let with = |colour: &Picture, opacity: &Picture, change: fn(f32, f32) -> f32| {

@@ -4,7 +4,7 @@ This module needs NumPy alone and draws. `softrast.torch` and `softrast.jax` hav
 
 Vertices are `[views, V, 3]`: world units with y up before `project`, then x and y in NDC (x right, y up, the shorter side of the image is
 [-1, 1]) and the camera depth in world units. Images are `[views, height, width]`, top row first. Float types are float32 and float64; an
-image has that of its vertices. Whatever is wrong is a `ValueError` of one line.
+image has that of its vertices. Arrays of others that have `__dlpack__`, such as tensors of torch, are read without a copy. Whatever is wrong is a `ValueError` of one line.
 """
 
 from __future__ import annotations
@@ -16,13 +16,16 @@ import numpy as _np
 from numpy.typing import ArrayLike as _ArrayLike
 
 from . import _cameras, _native, _shapes
+from ._meshes_of_views import FoundMesh, fit_mesh, paint
 from ._native import Softness, __version__, families, learned_names
 from ._pose import FoundPose, Pose, find_pose, load_mask
 from ._renderers import ColourRenderer, Renderer, Size as _Size
+from ._views import Views, load_views
 
 __all__ = [
-    "ColourRenderer", "FoundPose", "Pose", "Renderer", "Softness", "blend", "families", "find_pose", "fox", "hard_silhouette", "icosphere",
-    "learned_names", "load_mask", "load_mesh", "orbit", "pinhole", "project", "save_mesh", "silhouette",
+    "ColourRenderer", "FoundMesh", "FoundPose", "Pose", "Renderer", "Softness", "Views", "blend", "families", "find_pose", "fit_mesh", "fox",
+    "hard_silhouette", "icosphere", "learned_names", "load_mask", "load_mesh", "load_views", "orbit", "paint", "pinhole", "project", "save_mesh",
+    "silhouette",
 ]
 
 _Path = _Union[str, "_os.PathLike[str]"]
@@ -60,7 +63,8 @@ def orbit(
 
     Numbers or vectors `[views]`. At azimuth 0 a camera stands at -z with +x on its left, at 90 at +x.
     """
-    return _np.stack(_np.broadcast_arrays(*map(_np.atleast_1d, (distance, elevation_deg, azimuth_deg, fov_deg))), -1).astype(_np.float64)
+    numbers = [_np.atleast_1d(_shapes.as_array(x, "orbit")) for x in (distance, elevation_deg, azimuth_deg, fov_deg)]
+    return _np.stack(_np.broadcast_arrays(*numbers), -1).astype(_np.float64)
 
 
 def pinhole(K: _ArrayLike, R: _ArrayLike, t: _ArrayLike, size: _Size, convention: str = "opencv") -> _np.ndarray:
@@ -75,7 +79,7 @@ def pinhole(K: _ArrayLike, R: _ArrayLike, t: _ArrayLike, size: _Size, convention
 
     Raises `ValueError` for another convention, or shapes that do not fit.
     """
-    return _cameras.pinhole(_np, *(_np.asarray(x, _np.float64) for x in (K, R, t)), size, convention)
+    return _cameras.pinhole(_np, *(_np.asarray(_shapes.as_array(x, name), _np.float64) for x, name in ((K, "K"), (R, "R"), (t, "t"))), size, convention)
 
 
 def project(vertices: _ArrayLike, cameras: _ArrayLike) -> _np.ndarray:
@@ -142,7 +146,7 @@ def blend(
         attributes.shape, vertices.shape[0], renderer.least_vertices if corners is None else corners.max(initial=-1) + 1,
         None if texture is None else texture.shape,
     )
-    background = _np.asarray(background, dtype)
+    background = _np.asarray(_shapes.as_array(background, "background"), dtype)
     _shapes.background(background.shape, channels)
     log_weight = renderer.log_weight if log_weight is None else float(log_weight)
     phi, phi_depth = (

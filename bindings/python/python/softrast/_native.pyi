@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 _Path = Union[str, "os.PathLike[str]"]
 _Mesh = Tuple[NDArray[np.float64], NDArray[np.int64], Optional[NDArray[np.float64]]]
 _Floats = Union[NDArray[np.float32], NDArray[np.float64]]
+_Camera = Tuple[List[List[float]], List[float], List[float]]
+_Visit = Callable[[int, int, float], object]
 _Numbers = Union[Sequence[float], NDArray[np.float64]]
 
 __version__: str
@@ -105,8 +107,29 @@ def hard_silhouette(vertices: NDArray[np.float64], faces: NDArray[np.int64], siz
 def load_mask(path: _Path) -> NDArray[np.float32]: ...
 def find_pose(
     positions: NDArray[np.float64], faces: NDArray[np.int64], mask: NDArray[np.float32], lens: Sequence[float],
-    start: Optional[Tuple[List[List[float]], List[float]]], visit: Optional[Callable[[int, int, float], object]]
-) -> List[Tuple[List[List[float]], List[float], float]]: ...
+    start: Optional[Tuple[List[List[float]], List[float]]], visit: Optional[_Visit]
+) -> Tuple[List[Tuple[List[List[float]], List[float], float]], bool]: ...
+def load_views(
+    path: _Path, masks: Optional[_Path], rules: Tuple[bool, Optional[float], Optional[int]], pictures: bool, normals: Optional[_Path]
+) -> Tuple[
+    List[str], List[NDArray[np.float32]], Optional[List[NDArray[np.float32]]], Optional[List[NDArray[np.float32]]], List[_Camera], List[str]
+]: ...
+def view_iou(
+    positions: NDArray[np.float64], faces: NDArray[np.int64], masks: List[NDArray[np.float32]], cameras: List[_Camera]
+) -> List[float]: ...
+def view_psnr(
+    positions: NDArray[np.float64], faces: NDArray[np.int64], colours: NDArray[np.float64], masks: List[NDArray[np.float32]],
+    cameras: List[_Camera], pictures: List[NDArray[np.float32]]
+) -> List[float]: ...
+def fit_mesh(
+    names: List[str], masks: List[NDArray[np.float32]], cameras: List[_Camera], pictures: Optional[List[NDArray[np.float32]]],
+    normals: Optional[List[NDArray[np.float32]]], start: Optional[Tuple[NDArray[np.float64], NDArray[np.int64]]], hull: bool, size: int,
+    steps: int, most_faces: int, smoothing: float, visit: Optional[_Visit]
+) -> Tuple[_Mesh, bool]: ...
+def paint(
+    positions: NDArray[np.float64], faces: NDArray[np.int64], names: List[str], masks: List[NDArray[np.float32]], cameras: List[_Camera],
+    pictures: List[NDArray[np.float32]], size: int, steps: int, learning_rate: float, visit: Optional[_Visit]
+) -> Tuple[_Mesh, bool]: ...
 def families() -> List[str]: ...
 def learned_names() -> List[str]: ...
 def load_mesh(path: _Path) -> _Mesh: ...

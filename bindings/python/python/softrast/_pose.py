@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Optional, Tuple, Union
+from typing import Dict, List, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _cameras, _native, _shapes
+from . import _cameras, _native, _progress, _shapes
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +30,14 @@ class FoundPose(Pose):
     """The pose that fits best, and others that fit nearly as well, as `find_pose` returns them.
 
     `K` `[3, 3]` and `size` `(height, width)` are those of the mask. `alternatives` are at least 6 degrees apart and have an overlap that is less by
-    0.03 at most, the best first: a silhouette alone does not tell them from the answer.
+    0.03 at most, the best first: a silhouette alone does not tell them from the answer. `complete` is False where Ctrl-C ended the search: the pose is the
+    best until then, without alternatives.
     """
 
     K: NDArray[np.float64]
     size: Tuple[int, int]
     alternatives: Tuple[Pose, ...]
+    complete: bool = True
 
     @property
     def cameras(self) -> NDArray[np.float64]:
@@ -64,36 +66,32 @@ def load_mask(path: Union[str, os.PathLike[str]]) -> NDArray[np.float32]:
 
 def find_pose(
     mesh: Tuple[ArrayLike, ArrayLike, object], mask: ArrayLike, K: ArrayLike, *, start: Optional[Tuple[ArrayLike, ArrayLike]] = None,
-    progress: Optional[Callable[[int, int, float], object]] = None,
+    progress: _progress.Progress = None,
 ) -> FoundPose:
     """The camera from which a mesh has the silhouette of a mask.
 
     `mesh` is positions `[V, 3]`, faces `[F, 3]` and anything third, as `load_mesh` returns them, anywhere and in any unit. `mask` `[height, width]`
     is bool, or float in [0, 1], top row first. `K` `[3, 3]` is in pixels with the centre of the first pixel at (0, 0), as `pinhole` takes it, without
     skew. All directions are tried, or `start` alone, which is an `R` and a `t`. `progress` receives the number of each step, which starts at 1
-    and never falls, the largest number that it may reach, and the least loss.
+    and never falls, the largest number that it may reach, and the least loss; or it is a bar of tqdm.
 
-    Ctrl-C ends the call, and so does an error of `progress`, which is raised again; no pose is returned then. Raises `ValueError` if nothing or all of the
+    Ctrl-C ends the search at its next step and returns the best pose until then, with `complete` False; before the first step, or for the second time, it
+    raises KeyboardInterrupt. An error of `progress` is raised again. Raises `ValueError` if nothing or all of the
     mask is inside, the mesh has no extent, the start does not see it, or an argument is out of range.
     """
     positions, faces = _shapes.rows(mesh[0], "positions"), _shapes.faces(mesh[1])
-    levels = np.asarray(mask)
-    if levels.ndim != 2 or levels.dtype.kind not in "bf":
-        raise ValueError(f"mask must be [height, width] of bool or float in [0, 1], found {levels.dtype} {list(levels.shape)}")
-    levels = levels.astype(np.float32)
-    if not ((levels >= 0.0) & (levels <= 1.0)).all():
-        raise ValueError("mask must be in [0, 1], found a level that is not")
-    lens = np.asarray(K, np.float64)
+    levels = _shapes.mask(mask)
+    lens = np.asarray(_shapes.as_array(K, "K"), np.float64)
     if lens.shape != (3, 3) or lens[0, 1] != 0.0:
         raise ValueError(f"K must be [3, 3] without skew, found {lens.tolist()}")
     known = None
     if start is not None:
-        R, t = np.asarray(start[0], np.float64), np.asarray(start[1], np.float64)
+        R, t = (np.asarray(_shapes.as_array(x, "start"), np.float64) for x in start)
         if R.shape != (3, 3) or t.shape != (3,):
             raise ValueError(f"start must be R [3, 3] and t [3], found {list(R.shape)} and {list(t.shape)}")
         known = R.tolist(), t.tolist()
     # Pixels from the corner of the picture, not from the centre of its first pixel.
     numbers = [lens[0, 0], lens[1, 1], lens[0, 2] + 0.5, lens[1, 2] + 0.5]
-    found = _native.find_pose(positions, faces, levels, numbers, known, progress)
+    found, complete = _native.find_pose(positions, faces, levels, numbers, known, _progress.visit(progress))
     best, *others = (Pose(np.array(R), np.array(t), iou) for R, t, iou in found)
-    return FoundPose(best.R, best.t, best.iou, lens, (levels.shape[0], levels.shape[1]), tuple(others))
+    return FoundPose(best.R, best.t, best.iou, lens, (levels.shape[0], levels.shape[1]), tuple(others), complete)

@@ -10,12 +10,30 @@ def softness(found):
         raise ValueError(f"softness must be a softrast.Softness such as Softness('logistic', 0.01), found {type(found).__name__}")
 
 
-def floats(array, name):
-    """An array of floats as it is, numbers of other types refused."""
+# The CPU among the devices of DLPack.
+_CPU = 1
+
+
+def as_array(found, name):
+    """An array of NumPy: the same numbers without a copy where what is given has `__dlpack__`, as tensors of torch and arrays of JAX."""
+    if isinstance(found, np.ndarray):
+        return found
+    if hasattr(found, "__dlpack__") and hasattr(np, "from_dlpack"):
+        if found.__dlpack_device__()[0] != _CPU:
+            raise ValueError(f"{name} must lie on the CPU: move it there first")
+        try:
+            return np.from_dlpack(found)
+        except (BufferError, RuntimeError, TypeError, ValueError):
+            pass  # Types that DLPack or NumPy does not know; tensors with gradients fail below too.
     try:
-        array = np.asarray(array)
+        return np.asarray(found)
     except Exception as error:
         raise ValueError(f"{name} is no array: {' '.join(str(error).split())}") from None
+
+
+def floats(found, name):
+    """An array of floats as it is, numbers of other types refused."""
+    array = as_array(found, name)
     if array.dtype not in (np.float32, np.float64):
         raise ValueError(f"{name} must be float32 or float64, found {array.dtype}: convert with astype")
     return array
@@ -23,7 +41,7 @@ def floats(array, name):
 
 def vector(array, name):
     """Parameters as float64 `[P]`."""
-    array = np.asarray(array, np.float64)
+    array = as_array(array, name).astype(np.float64)
     if array.ndim != 1:
         raise ValueError(f"{name} must be a vector, found {list(array.shape)}")
     return np.ascontiguousarray(array)
@@ -31,7 +49,7 @@ def vector(array, name):
 
 def rows(array, name):
     """float64 `[N, 3]`."""
-    array = np.asarray(array, np.float64)
+    array = np.asarray(as_array(array, name), np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must be [N, 3], found {list(array.shape)}")
     return array
@@ -39,10 +57,10 @@ def rows(array, name):
 
 def faces(faces, name="faces"):
     """Faces as int64 `[F, 3]`."""
-    faces = np.asarray(faces)
+    faces = as_array(faces, name)
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
         raise ValueError(f"{name} must be integers [F, 3], found {faces.dtype} {list(faces.shape)}")
-    return faces.astype(np.int64)
+    return faces.astype(np.int64, copy=False)
 
 
 def size(size):
@@ -55,6 +73,24 @@ def size(size):
     if not fits:
         raise ValueError(f"size must be a number of pixels or (height, width), found {size}")
     return [int(side) for side in pair]
+
+
+def whole(number, name, least):
+    """A whole number that is at least this."""
+    if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < least:
+        raise ValueError(f"{name} must be a whole number from {least} on, found {number!r}")
+    return int(number)
+
+
+def mask(mask):
+    """A mask as float32 `[height, width]` in [0, 1]."""
+    levels = as_array(mask, "mask")
+    if levels.ndim != 2 or levels.dtype.kind not in "bf":
+        raise ValueError(f"mask must be [height, width] of bool or float in [0, 1], found {levels.dtype} {list(levels.shape)}")
+    levels = levels.astype(np.float32)
+    if not ((levels >= 0.0) & (levels <= 1.0)).all():
+        raise ValueError("mask must be in [0, 1], found a level that is not")
+    return levels
 
 
 def planes(planes):

@@ -8,7 +8,7 @@ and so are the results.
 
 from __future__ import annotations
 
-from typing import List as _List, Optional as _Optional, Sequence as _Sequence, Tuple as _Tuple, Union as _Union
+from typing import Any as _Any, List as _List, Optional as _Optional, Sequence as _Sequence, Tuple as _Tuple, Union as _Union
 
 import torch as _torch
 
@@ -17,7 +17,7 @@ import softrast as _softrast
 from . import _cameras, _ops, _passes, _shapes
 
 __all__ = [
-    "blend", "from_clip", "hard_silhouette", "hvp", "iou_loss", "jvp", "mse_loss", "orbit", "pinhole", "project", "silhouette", "silhouettes",
+    "blend", "blends", "from_clip", "hard_silhouette", "hvp", "iou_loss", "jvp", "mse_loss", "orbit", "pinhole", "project", "silhouette", "silhouettes",
     "value_and_grad",
 ]
 
@@ -130,10 +130,33 @@ def silhouettes(
     `[meshes, views, height, width]` with zeros behind the views of a mesh that has fewer than others, or `[all views, height, width]` if
     `packed`. Raises `ValueError` if there is no mesh, or numbers of renderers and vertices or sizes of images differ.
     """
+    _meshes(renderers, vertices)
+    return _joined([silhouette(renderer, corners) for renderer, corners in zip(renderers, vertices)], packed)
+
+
+def blends(
+    renderers: _Sequence[_softrast.ColourRenderer], vertices: _Sequence[_torch.Tensor], attributes: _Sequence[_torch.Tensor],
+    background: _Number = 0.0, *, packed: bool = False,
+) -> _torch.Tensor:
+    """Soft colours of several meshes, each with its renderer, its projected vertices `[views, V, 3]` and its attributes as `blend` takes them.
+
+    `[meshes, views, channels + 1, height, width]` with zeros behind the views of a mesh that has fewer than others, or `[all views, channels + 1, height,
+    width]` if `packed`. All have the same `background`. Raises `ValueError` as `silhouettes` does, and if numbers of channels differ.
+    """
+    _meshes(renderers, vertices)
+    if len(attributes) != len(vertices) or len({of.shape[-1] for of in attributes}) > 1:
+        found = [list(of.shape) for of in attributes]
+        raise ValueError(f"attributes must be one tensor for each of the {len(vertices)} meshes, of as many channels, found {found}")
+    return _joined([blend(*mesh, background) for mesh in zip(renderers, vertices, attributes)], packed)
+
+
+def _meshes(renderers: _Sequence[_Any], vertices: _Sequence[_torch.Tensor]) -> None:
     if len(renderers) != len(vertices) or not renderers or len({renderer.size for renderer in renderers}) > 1:
         sizes = [renderer.size for renderer in renderers]
-        raise ValueError(f"silhouettes need a renderer for each mesh, of one size, found {len(vertices)} meshes and renderers of {sizes}")
-    images = [silhouette(renderer, corners) for renderer, corners in zip(renderers, vertices)]
+        raise ValueError(f"there must be a renderer for each mesh, of one size, found {len(vertices)} meshes and renderers of {sizes}")
+
+
+def _joined(images: _List[_torch.Tensor], packed: bool) -> _torch.Tensor:
     return _torch.cat(images) if packed else _torch.nn.utils.rnn.pad_sequence(images, batch_first=True)
 
 

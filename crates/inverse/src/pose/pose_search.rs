@@ -14,8 +14,8 @@ use crate::{Method, ScheduledSoftness};
 /// Default steps at high resolution: by a mask, and by colours. Only silhouettes are refined by least squares afterwards.
 const FINE_STEPS: [usize; 2] = [20, 80];
 
-/// A function that receives the number of each step and the smallest loss.
-type Visit<'a> = Box<dyn FnMut(usize, f64) -> anyhow::Result<()> + 'a>;
+/// A function that receives the number of each step, the least loss, and the pose that fits best so far.
+type Visit<'a> = Box<dyn FnMut(usize, f64, &Pinhole) -> anyhow::Result<()> + 'a>;
 
 /// The search for the camera pose at which a mesh has a given silhouette.
 ///
@@ -69,7 +69,7 @@ impl<'a> PoseSearch<'a> {
             learning_rate: Self::LEARNING_RATE,
             optimise_fov: false,
             method: Method::new("learned", learned),
-            visit: Box::new(|_, _| Ok(())),
+            visit: Box::new(|_, _, _| Ok(())),
         }
     }
 
@@ -130,7 +130,16 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
 
     /// Passes the number of each step and the smallest loss to `visit`. An error of it ends the search.
     #[must_use]
-    pub fn progress(self, visit: impl FnMut(usize, f64) -> anyhow::Result<()> + 'a) -> Self {
+    pub fn progress(self, mut visit: impl FnMut(usize, f64) -> anyhow::Result<()> + 'a) -> Self {
+        self.progress_with_pose(move |step, loss, _| visit(step, loss))
+    }
+
+    /// Shows `visit` the number of each step, the least loss, and the camera that fits best so far by its hard silhouette. An error of it ends the search.
+    #[must_use]
+    pub fn progress_with_pose(
+        self,
+        visit: impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()> + 'a,
+    ) -> Self {
         Self { visit: Box::new(visit), ..self }
     }
 

@@ -126,11 +126,13 @@ impl Search {
         camera: &Pinhole,
         started: bool,
         method: &Method<impl Softness>,
-        visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
+        visit: &mut impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
         check(mesh, target.mask, camera, started)?;
         let frame = Frame::of_mesh(mesh);
         let (mesh, camera) = (&frame.mesh(mesh), frame.camera(camera));
+        let visit =
+            &mut |step, loss, pose: &Pinhole| visit(step, loss, &frame.camera_to_world(pose));
         let fixed = Self { optimise_fov: false, ..*self };
         let starts = match started {
             true => vec![camera],
@@ -151,9 +153,10 @@ impl Search {
         found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
         if target.painted.is_none() {
             begun += self.fine_steps;
-            let loss = found.first().context("no pose was tried")?.1;
-            let visit =
-                |share: f64| visit(begun + (share * SHARPENING_STEPS as f64).ceil() as usize, loss);
+            let (best, loss) = *found.first().context("no pose was tried")?;
+            let visit = |share: f64| {
+                visit(begun + (share * SHARPENING_STEPS as f64).ceil() as usize, loss, &best)
+            };
             found = self.sharpened(mesh, target, &found, visit)?;
         } else if self.optimise_fov {
             begun += self.fine_steps;
@@ -185,12 +188,14 @@ impl Search {
         mask: &Picture,
         camera: &Pinhole,
         method: &Method<impl Softness>,
-        visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
+        visit: &mut impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
         check(mesh, mask, camera, false)?;
         let frame = Frame::of_mesh(mesh);
         let (mesh, camera, target) =
             (frame.mesh(mesh), frame.camera(camera), Target::new(mask, None)?);
+        let visit =
+            &mut |step, loss, pose: &Pinhole| visit(step, loss, &frame.camera_to_world(pose));
         let starts = self.promising_starts::<B>(&mesh, &target, &camera, method, visit)?;
         Ok(starts.iter().map(|camera| frame.camera_to_world(camera)).collect())
     }
@@ -201,7 +206,7 @@ impl Search {
         target: &Target<'_>,
         camera: &Pinhole,
         method: &Method<impl Softness>,
-        visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
+        visit: &mut impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
         let few = coarse(mesh);
         let alike = target.painted.is_none().then_some(&*few);
@@ -294,7 +299,7 @@ impl Search {
         method: &Method<impl Softness>,
         stage: &SolveConfig,
         begun: usize,
-        visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
+        visit: &mut impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<(Pinhole, f64)>> {
         let problem = self.problem(mesh, &poses);
         let mut best = vec![None; poses.len()];
@@ -306,7 +311,11 @@ impl Search {
                 }
             }
             let least = iterate.loss.iter().copied().fold(f64::INFINITY, f64::min);
-            if iterate.step == 0 { Ok(()) } else { visit(begun + iterate.step, least) }
+            let fits = best.iter().flatten().min_by(|(_, a), (_, b)| a.total_cmp(b));
+            match fits {
+                Some((camera, _)) if iterate.step > 0 => visit(begun + iterate.step, least, camera),
+                _ => Ok(()),
+            }
         })?;
         Ok(best.into_iter().flatten().collect())
     }
