@@ -6,6 +6,7 @@
 mod checks;
 mod colour;
 mod guard;
+mod learn;
 mod meshes;
 mod op;
 mod pose;
@@ -27,6 +28,7 @@ mod _native {
     use crate::{
         colour::{ColourRenderer, PreparedColour},
         guard::threads,
+        learn::learn_softness,
         meshes::{fox, icosphere, load_mesh, save_mesh},
         op::{Op, iou_loss, mse_loss, orbit_matrix, perspective},
         pose::{find_pose, load_mask},

@@ -74,7 +74,7 @@ pub(crate) fn find_pose(
             (found, _) => found,
         }
     };
-    let (poses, interrupted) = watched(py, visit, work)?;
+    let (poses, interrupted) = watched(py, visit, true, work)?;
     let poses = poses
         .iter()
         .map(|FoundPose { camera, iou, .. }| (camera.rotation, camera.translation, *iou));

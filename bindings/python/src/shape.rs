@@ -84,7 +84,7 @@ pub(crate) fn fit_mesh<'py>(
         let found = fit.progress(|step, loss| watch.step(step, steps, loss)).run()?;
         Ok(frame.mesh_to_world(&found.mesh)?)
     };
-    let (mesh, interrupted) = watched(py, visit, work)?;
+    let (mesh, interrupted) = watched(py, visit, true, work)?;
     Ok((parts(py, &mesh)?, !interrupted))
 }
 
@@ -111,7 +111,7 @@ pub(crate) fn paint<'py>(
         let each = |step: usize, loss| watch.step(step + 1, steps, loss);
         Ok(paint_until_stopped(&mesh, &views, &config, each)?.0)
     };
-    let (mesh, interrupted) = watched(py, visit, work)?;
+    let (mesh, interrupted) = watched(py, visit, true, work)?;
     Ok((parts(py, &mesh)?, !interrupted))
 }
 

@@ -41,7 +41,8 @@ impl Watch {
     }
 }
 
-/// The result of `work`, and whether Ctrl-C ended it early. `visit` receives each step; a KeyboardInterrupt that it raises counts as Ctrl-C.
+/// The result of `work`, and whether Ctrl-C ended it early. `visit` receives each step; a KeyboardInterrupt that it raises counts as Ctrl-C. Where it `waits`, the step at
+/// which the work ends then is awaited; else the KeyboardInterrupt is returned.
 ///
 /// # Errors
 ///
@@ -49,6 +50,7 @@ impl Watch {
 pub(crate) fn watched<T: Send + 'static>(
     py: Python<'_>,
     visit: Option<Py<PyAny>>,
+    waits: bool,
     work: impl FnOnce(Watch) -> anyhow::Result<T> + Send + 'static,
 ) -> PyResult<(T, bool)> {
     let (shown, mut seen) = mpsc::channel();
@@ -68,7 +70,7 @@ pub(crate) fn watched<T: Send + 'static>(
         if let Err(error) = visited {
             ended.store(true, Ordering::Relaxed);
             // Ctrl-C for the second time does not wait.
-            if interrupted || !begun || !error.is_instance_of::<PyKeyboardInterrupt>(py) {
+            if interrupted || !begun || !waits || !error.is_instance_of::<PyKeyboardInterrupt>(py) {
                 return Err(error);
             }
             interrupted = true;

@@ -16,6 +16,7 @@ import numpy as _np
 from numpy.typing import ArrayLike as _ArrayLike
 
 from . import _cameras, _native, _shapes
+from ._learning import LearnedSoftness, learn_softness
 from ._meshes_of_views import FoundMesh, fit_mesh, paint
 from ._native import Softness, __version__, families, learned_names
 from ._pose import FoundPose, Pose, find_pose, load_mask
@@ -23,8 +24,8 @@ from ._renderers import ColourRenderer, Renderer, Size as _Size
 from ._views import Views, load_views
 
 __all__ = [
-    "ColourRenderer", "FoundMesh", "FoundPose", "Pose", "Renderer", "Softness", "Views", "blend", "families", "find_pose", "fit_mesh", "fox",
-    "hard_silhouette", "icosphere", "learned_names", "load_mask", "load_mesh", "load_views", "orbit", "paint", "pinhole", "project", "save_mesh",
+    "ColourRenderer", "FoundMesh", "FoundPose", "LearnedSoftness", "Pose", "Renderer", "Softness", "Views", "blend", "families", "find_pose", "fit_mesh", "fox",
+    "hard_silhouette", "icosphere", "learn_softness", "learned_names", "load_mask", "load_mesh", "load_views", "orbit", "paint", "pinhole", "project", "save_mesh",
     "silhouette",
 ]
 

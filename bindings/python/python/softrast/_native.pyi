@@ -114,6 +114,10 @@ def load_views(
 ) -> Tuple[
     List[str], List[NDArray[np.float32]], Optional[List[NDArray[np.float32]]], Optional[List[NDArray[np.float32]]], List[_Camera], List[str]
 ]: ...
+def learn_softness(
+    positions: NDArray[np.float64], faces: NDArray[np.int64], softness: Softness, size: int, steps: int, updates: int, batch: int,
+    rate: float, visit: Optional[_Visit]
+) -> Tuple[Softness, List[float], bool]: ...
 def view_iou(
     positions: NDArray[np.float64], faces: NDArray[np.int64], masks: List[NDArray[np.float32]], cameras: List[_Camera]
 ) -> List[float]: ...
