@@ -90,6 +90,18 @@ def test_colours_are_those_of_numpy_with_derivatives_of_both_orders():
     assert np.array_equal(each, softrast.blend(draw, seen, values))
 
 
+def test_derivatives_of_colours_can_be_mapped_over():
+    draw = softrast.ColourRenderer(FACES, (4, 3), softrast.Softness("logistic", 0.2), [1.5, 3.5], depth_scale=0.3)
+    seen = jnp.asarray(softrast.project(CORNERS, CAMERAS))
+    palettes = np.random.default_rng(0).random((3, 4, 2))
+    loss = lambda values, view: (sj.blend(draw, view[None], values, 0.5) ** 2).sum()
+    for of in (jax.grad(loss, (0, 1)), lambda *x: (jax.hessian(loss)(*x),), lambda values, view: (jax.jacfwd(loss, 1)(values, view),)):
+        mapped = jax.jit(jax.vmap(jax.vmap(of, (None, 0)), (0, None)))(palettes, seen)
+        each = [[of(values, view) for view in seen] for values in palettes]
+        for k, found in enumerate(mapped):
+            assert np.allclose(found, np.stack([np.stack([pair[k] for pair in row]) for row in each]), rtol=1e-10, atol=1e-12)
+
+
 def test_gradients_of_phi_are_those_of_torch():
     torch = pytest.importorskip("torch")
     import softrast.torch as st
