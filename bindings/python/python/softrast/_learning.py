@@ -17,8 +17,8 @@ from ._native import Softness
 class LearnedSoftness:
     """A softness that was learned, as `learn_softness` returns it.
 
-    `errors` are mean errors of runs for validation, at the start and after each tenth of the updates; `softness` is that of the least. `complete` is False
-    where Ctrl-C ended learning.
+    `errors` `[validations]` are mean losses that runs for validation end with, at the start and after each tenth of the updates: one less the overlap over
+    the union, under a narrow softness. `softness` is that of the least. `complete` is False where Ctrl-C ended learning.
     """
 
     softness: Softness
