@@ -2,9 +2,10 @@
 
 This module needs NumPy alone and draws. `softrast.torch` and `softrast.jax` have the same functions with gradients.
 
-Vertices are `[views, V, 3]`: world units with y up before `project`, then x and y in NDC (x right, y up, the shorter side of the image is
-[-1, 1]) and the camera depth in world units. Images are `[views, height, width]`, top row first. Float types are float32 and float64; an
-image has that of its vertices. Arrays of others that have `__dlpack__`, such as tensors of torch, are read without a copy. Whatever is wrong is a `ValueError` of one line.
+Vertices are `[views, V, 3]`: world units with y up before `project`, then x and y in NDC (x right, y up, the shorter side of the image is [-1,
+1]) and the camera depth in world units. Images are `[views, height, width]`, top row first. Float types are float32 and float64; an image has
+that of its vertices. Arrays of others that have `__dlpack__`, such as tensors of torch, are read without a copy. Whatever is wrong is a
+`ValueError` of one line.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from ._renderers import ColourRenderer, Renderer, Size as _Size
 from ._views import Views, load_views
 
 __all__ = [
-    "ColourRenderer", "FoundMesh", "FoundPose", "LearnedSoftness", "Pose", "Renderer", "Softness", "Views", "blend", "families", "find_pose", "fit_mesh", "fox",
-    "hard_silhouette", "icosphere", "learn_softness", "learned_names", "load_mask", "load_mesh", "load_views", "orbit", "paint", "pinhole", "project", "save_mesh",
-    "silhouette",
+    "ColourRenderer", "FoundMesh", "FoundPose", "LearnedSoftness", "Pose", "Renderer", "Softness", "Views", "blend", "families",
+    "find_pose", "fit_mesh", "fox", "hard_silhouette", "icosphere", "learn_softness", "learned_names", "load_mask", "load_mesh",
+    "load_views", "orbit", "paint", "pinhole", "project", "save_mesh", "silhouette",
 ]
 
 _Path = _Union[str, "_os.PathLike[str]"]
@@ -71,8 +72,8 @@ def orbit(
 def pinhole(K: _ArrayLike, R: _ArrayLike, t: _ArrayLike, size: _Size, convention: str = "opencv") -> _np.ndarray:
     """Cameras `[views, 3, 4]` (float64) of matrices `K` `[3, 3]` and poses `R` `[3, 3]`, `t` `[3]`, each with views first if there are several.
 
-    `size` is that of the image: a number of pixels, or `(height, width)`. `K` is in pixels with the centre of the first pixel at (0, 0), as OpenCV
-    has it; COLMAP's cx and cy are larger by 0.5. `t` is in world units. `convention` names the axes of the camera and what R and t do:
+    `size` is that of the image: a number of pixels, or `(height, width)`. `K` is in pixels with the centre of the first pixel at (0, 0), as
+    OpenCV has it; COLMAP's cx and cy are larger by 0.5. `t` is in world units. `convention` names the axes of the camera and what R and t do:
 
     - "opencv": `R X + t`, x right, y down, z ahead;
     - "opengl": `R X + t`, x right, y up, z behind: the view matrix, which is the inverse of a camera-to-world matrix;
@@ -80,7 +81,8 @@ def pinhole(K: _ArrayLike, R: _ArrayLike, t: _ArrayLike, size: _Size, convention
 
     Raises `ValueError` for another convention, or shapes that do not fit.
     """
-    return _cameras.pinhole(_np, *(_np.asarray(_shapes.as_array(x, name), _np.float64) for x, name in ((K, "K"), (R, "R"), (t, "t"))), size, convention)
+    K, R, t = (_np.asarray(_shapes.as_array(x, name), _np.float64) for x, name in ((K, "K"), (R, "R"), (t, "t")))
+    return _cameras.pinhole(_np, K, R, t, size, convention)
 
 
 def project(vertices: _ArrayLike, cameras: _ArrayLike) -> _np.ndarray:

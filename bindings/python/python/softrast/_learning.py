@@ -17,8 +17,8 @@ from ._native import Softness
 class LearnedSoftness:
     """A softness that was learned, as `learn_softness` returns it.
 
-    `errors` `[validations]` are mean losses that runs for validation end with, at the start and after each tenth of the updates: one less the overlap over
-    the union, under a narrow softness. `softness` is that of the least. `complete` is False where Ctrl-C ended learning.
+    `errors` `[validations]` are mean losses that runs for validation end with, at the start and after each tenth of the updates: one less the
+    overlap over the union, under a narrow softness. `softness` is that of the least. `complete` is False where Ctrl-C ended learning.
     """
 
     softness: Softness
@@ -36,13 +36,14 @@ def learn_softness(
 ) -> LearnedSoftness:
     """A softness for finding poses of a mesh: what makes runs of gradient descent end as near to the pose as they can.
 
-    `mesh` is positions `[V, 3]`, faces `[F, 3]` and anything third, anywhere and in any unit. Learning begins with `softness`. A run looks for a pose by
-    `steps` steps on `size` by `size` pixels, from a start that is 35 to 55 degrees off. Each of the `updates` draws `batch` runs, and moves the
-    parameters by Adam at `learning_rate`: by an evolution strategy up to ten parameters, else by the exact gradient through all steps. Other tasks can be
-    learned through a loop of your own, with `softrast.torch`.
+    `mesh` is positions `[V, 3]`, faces `[F, 3]` and anything third, anywhere and in any unit. Learning begins with `softness`. A run looks for a
+    pose by `steps` steps on `size` by `size` pixels, from a start that is 35 to 55 degrees off. Each of the `updates` draws `batch` runs, and
+    moves the parameters by Adam at `learning_rate`: by an evolution strategy up to ten parameters, else by the exact gradient through all steps.
+    Other tasks can be learned through a loop of your own, with `softrast.torch`.
 
     `progress` is a function that receives the number of each update, how many there are and the error, or a bar of tqdm. Ctrl-C returns the best
-    softness until then, with `complete` False; before the first update it raises KeyboardInterrupt. Raises `ValueError` if an argument is out of range.
+    softness until then, with `complete` False; before the first update it raises KeyboardInterrupt. Raises `ValueError` if an argument is out of
+    range.
     """
     positions, faces = _shapes.rows(mesh[0], "positions"), _shapes.faces(mesh[1])
     _shapes.softness(softness)

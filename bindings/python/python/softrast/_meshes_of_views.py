@@ -70,14 +70,16 @@ def fit_mesh(
 ) -> FoundMesh:
     """The surface that views show: a closed mesh with the silhouettes of their masks, `[V, 3]` and `[F, 3]` in their world units.
 
-    Two views from different directions are the least. Where the views have `normals`, these pull the surface too, and with `colours` so do the pictures,
-    which also give it the colours of its vertices. It is remeshed as it moves, in `steps` steps, on up to `size` by `size` pixels (at least 8; as many as
-    the pictures have, up to 256, by default) and with at most `max_faces` faces. `smoothing` in (0, 5] is how much smoother than usual it is kept. `start`
-    is "hull", the visual hull of the masks, or "sphere", which has no holes, or a closed mesh as `load_mesh` returns it.
+    Two views from different directions are the least. Where the views have `normals`, these pull the surface too, and with `colours` so do the
+    pictures, which also give it the colours of its vertices. It is remeshed as it moves, in `steps` steps, on up to `size` by `size` pixels (at
+    least 8; as many as the pictures have, up to 256, by default) and with at most `max_faces` faces. `smoothing` in (0, 5] is how much smoother
+    than usual it is kept. `start` is "hull", the visual hull of the masks, or "sphere", which has no holes, or a closed mesh as `load_mesh`
+    returns it.
 
-    `progress` is a function that receives the number of each step, how many there are and the loss, or a bar of tqdm. Ctrl-C ends the search at its next
-    step and returns the mesh as it is then, with `complete` False; before the first step, or for the second time, it raises KeyboardInterrupt. An error of
-    `progress` is raised again. Raises `ValueError` if masks and cameras do not fit together or an argument is out of range.
+    `progress` is a function that receives the number of each step, how many there are and the loss, or a bar of tqdm. Ctrl-C ends the search at
+    its next step and returns the mesh as it is then, with `complete` False; before the first step, or for the second time, it raises
+    KeyboardInterrupt. An error of `progress` is raised again. Raises `ValueError` if masks and cameras do not fit together or an argument is out
+    of range.
     """
     if len(views) < 2:
         raise ValueError("fit_mesh needs two views or more, from different directions, found one")
@@ -104,9 +106,9 @@ def paint(
 ) -> FoundMesh:
     """A mesh in the colours that the pictures of views show: colours `[V, 3]` in [0, 1].
 
-    `mesh` is positions `[V, 3]`, faces `[F, 3]` and anything third, in the world units of the cameras. Its shape stays; faces that cover many pixels
-    are cut into four, so that the colours have room. `steps` steps of Adam at `learning_rate` compare `size` by `size` pixels around each mask. What no
-    view shows takes the colours around it.
+    `mesh` is positions `[V, 3]`, faces `[F, 3]` and anything third, in the world units of the cameras. Its shape stays; faces that cover many
+    pixels are cut into four, so that the colours have room. `steps` steps of Adam at `learning_rate` compare `size` by `size` pixels around each
+    mask. What no view shows takes the colours around it.
 
     `progress` and Ctrl-C are as for `fit_mesh`. Raises `ValueError` if the views have no pictures, or no camera has the mesh before it.
     """

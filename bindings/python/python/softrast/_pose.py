@@ -29,9 +29,9 @@ class Pose:
 class FoundPose(Pose):
     """The pose that fits best, and others that fit nearly as well, as `find_pose` returns them.
 
-    `K` `[3, 3]` and `size` `(height, width)` are those of the mask. `alternatives` are at least 6 degrees apart and have an overlap that is less by
-    0.03 at most, the best first: a silhouette alone does not tell them from the answer. `complete` is False where Ctrl-C ended the search: the pose is the
-    best until then, without alternatives.
+    `K` `[3, 3]` and `size` `(height, width)` are those of the mask. `alternatives` are at least 6 degrees apart and have an overlap that is less
+    by 0.03 at most, the best first: a silhouette alone does not tell them from the answer. `complete` is False where Ctrl-C ended the search:
+    the pose is the best until then, without alternatives.
     """
 
     K: NDArray[np.float64]
@@ -70,14 +70,14 @@ def find_pose(
 ) -> FoundPose:
     """The camera from which a mesh has the silhouette of a mask.
 
-    `mesh` is positions `[V, 3]`, faces `[F, 3]` and anything third, as `load_mesh` returns them, anywhere and in any unit. `mask` `[height, width]`
-    is bool, or float in [0, 1], top row first. `K` `[3, 3]` is in pixels with the centre of the first pixel at (0, 0), as `pinhole` takes it, without
-    skew. All directions are tried, or `start` alone, which is an `R` and a `t`. `progress` receives the number of each step, which starts at 1
-    and never falls, the largest number that it may reach, and the least loss; or it is a bar of tqdm.
+    `mesh` is positions `[V, 3]`, faces `[F, 3]` and anything third, as `load_mesh` returns them, anywhere and in any unit. `mask` `[height,
+    width]` is bool, or float in [0, 1], top row first. `K` `[3, 3]` is in pixels with the centre of the first pixel at (0, 0), as `pinhole`
+    takes it, without skew. All directions are tried, or `start` alone, which is an `R` and a `t`. `progress` receives the number of each step,
+    which starts at 1 and never falls, the largest number that it may reach, and the least loss; or it is a bar of tqdm.
 
-    Ctrl-C ends the search at its next step and returns the best pose until then, with `complete` False; before the first step, or for the second time, it
-    raises KeyboardInterrupt. An error of `progress` is raised again. Raises `ValueError` if nothing or all of the
-    mask is inside, the mesh has no extent, the start does not see it, or an argument is out of range.
+    Ctrl-C ends the search at its next step and returns the best pose until then, with `complete` False; before the first step, or for the second
+    time, it raises KeyboardInterrupt. An error of `progress` is raised again. Raises `ValueError` if nothing or all of the mask is inside, the
+    mesh has no extent, the start does not see it, or an argument is out of range.
     """
     positions, faces = _shapes.rows(mesh[0], "positions"), _shapes.faces(mesh[1])
     levels = _shapes.mask(mask)

@@ -113,10 +113,10 @@ def load_views(
     """Reads the pictures of a folder with their masks and cameras: `[height, width]` each, undistorted.
 
     Cameras are those of `transforms.json` (nerfstudio, instant-ngp), of a model of COLMAP in the folder, in `sparse/0` or `colmap`, or of
-    `transforms_train.json`; `path` may also be such a file. A mask is the file that the camera file names, or that of the picture's name in the folder
-    `masks` or in one of that name beside the pictures, else the picture itself: its transparency, or its luminance. `invert` takes what is black,
-    `threshold` in [0, 1] what is at least that bright, `label` the pixels of a class. `pictures=False` reads masks alone. `normals` is a folder with
-    pictures of normals, which have the names of the pictures.
+    `transforms_train.json`; `path` may also be such a file. A mask is the file that the camera file names, or that of the picture's name in the
+    folder `masks` or in one of that name beside the pictures, else the picture itself: its transparency, or its luminance. `invert` takes what
+    is black, `threshold` in [0, 1] what is at least that bright, `label` the pixels of a class. `pictures=False` reads masks alone. `normals` is
+    a folder with pictures of normals, which have the names of the pictures.
 
     Raises `ValueError` of one line that names the file and the frame if a file is missing or broken.
     """

@@ -1,8 +1,8 @@
 """The functions of `softrast` for PyTorch, differentiable twice, on the CPU.
 
 Gradients reach vertices, cameras, attributes, background, texture and φ, in reverse and in forward mode: `torch.autograd`, `torch.func.grad`,
-`vmap`, `jacrev`, `jacfwd`, `jvp` and `hessian` work, and `torch.compile(fullgraph=True)` with first derivatives. A third derivative raises
-an error. Arguments, shapes and units are those of `softrast`, with tensors in the place of arrays; float16 and bfloat16 are converted to float32,
+`vmap`, `jacrev`, `jacfwd`, `jvp` and `hessian` work, and `torch.compile(fullgraph=True)` with first derivatives. A third derivative raises an
+error. Arguments, shapes and units are those of `softrast`, with tensors in the place of arrays; float16 and bfloat16 are converted to float32,
 and so are the results.
 """
 
@@ -140,8 +140,8 @@ def blends(
 ) -> _torch.Tensor:
     """Soft colours of several meshes, each with its renderer, its projected vertices `[views, V, 3]` and its attributes as `blend` takes them.
 
-    `[meshes, views, channels + 1, height, width]` with zeros behind the views of a mesh that has fewer than others, or `[all views, channels + 1, height,
-    width]` if `packed`. All have the same `background`. Raises `ValueError` as `silhouettes` does, and if numbers of channels differ.
+    `[meshes, views, channels + 1, height, width]` with zeros behind the views of a mesh that has fewer than others, or `[all views, channels +
+    1, height, width]` if `packed`. All have the same `background`. Raises `ValueError` as `silhouettes` does, and if numbers of channels differ.
     """
     _meshes(renderers, vertices)
     if len(attributes) != len(vertices) or len({of.shape[-1] for of in attributes}) > 1:

@@ -134,7 +134,8 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
         self.progress_with_pose(move |step, loss, _| visit(step, loss))
     }
 
-    /// Shows `visit` the number of each step, the least loss, and the camera that fits best so far by its hard silhouette. An error of it ends the search.
+    /// Shows `visit` the number of each step, the least loss, and the camera that fits best so far by its hard silhouette. An error of it
+    /// ends the search.
     #[must_use]
     pub fn progress_with_pose(
         self,
