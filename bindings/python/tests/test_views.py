@@ -87,14 +87,16 @@ def test_slices_of_views_are_views(fox):
     some = fox[1::4]
     assert some.names == (fox.names[1], fox.names[5], fox.names[9]) and np.array_equal(some.R, fox.R[1::4]) and len(some.pictures) == 3
     assert len(fox[-1]) == 1 and fox[-1].names == (fox.names[-1],) and some.cameras.shape == (3, 3, 4)
+    again = fox[[1, 5, -3]]
+    assert again.names == some.names and np.array_equal(again.t, some.t) and np.array_equal(again.masks[2], some.masks[2])
+    with pytest.raises(IndexError):
+        fox[12]
 
 
 def test_a_mesh_has_the_masks_of_its_views_also_those_held_out(fox, tmp_path):
     seen = []
     held_out = fox[2::6]
-    rest = [k for k in range(12) if k % 6 != 2]
-    train = softrast.Views([fox.masks[k] for k in rest], fox.K[rest], fox.R[rest], fox.t[rest])
-    found = softrast.fit_mesh(train, steps=80, progress=lambda *step: seen.append(step))
+    found = softrast.fit_mesh(fox[[k for k in range(12) if k % 6 != 2]], steps=80, progress=lambda *step: seen.append(step))
     assert found.complete and found.iou.shape == (10,) and found.iou.mean() > 0.93 and found.iou_of(held_out).mean() > 0.85
     assert [step for step, _, _ in seen] == list(range(1, 81)) and all(count == 80 for _, count, _ in seen)
     edges = np.sort(found.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)

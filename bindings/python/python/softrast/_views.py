@@ -27,7 +27,8 @@ class Views:
     - `normals`: pictures whose red, green and blue are `(n + 1) / 2` of unit normals n in the axes of the world, or None.
     - `names`: for errors; `notes`: lines about what was read.
 
-    `views[k]` and slices such as `views[::2]` are views of fewer pictures. Raises `ValueError` if shapes do not fit.
+    `views[k]`, slices such as `views[::2]` and lists of numbers such as `views[[0, 3]]` are views of fewer pictures. Raises `ValueError` if
+    shapes do not fit.
     """
 
     masks: Sequence[NDArray[np.float32]] = field(repr=False)
@@ -65,14 +66,16 @@ class Views:
         """The number of views."""
         return len(self.masks)
 
-    def __getitem__(self, which: Union[int, slice]) -> Views:
-        """The view of a number, or those of a slice."""
-        if not isinstance(which, slice):
-            number = range(len(self))[which]
-            which = slice(number, number + 1)
+    def __getitem__(self, which: Union[int, slice, Sequence[int]]) -> Views:
+        """The view of a number, or those of a slice or of a list of numbers."""
+        numbers = range(len(self))
+        if isinstance(which, slice):
+            chosen = list(numbers[which])
+        else:
+            chosen = [numbers[k] for k in ([which] if isinstance(which, (int, np.integer)) else which)]
 
         def part(all: Any) -> Any:
-            return None if all is None else all[which]
+            return all[chosen] if isinstance(all, np.ndarray) else None if all is None else [all[k] for k in chosen]
 
         return Views(*map(part, (self.masks, self.K, self.R, self.t, self.pictures, self.normals, self.names)), self.notes)
 
