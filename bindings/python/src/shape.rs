@@ -5,11 +5,9 @@ use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use softrast_inverse::{
     SolveConfig, paint_until_stopped,
-    shape::{ShapeFit, ViewOfShape},
-    silhouette_pixels,
+    shape::{ShapeFit, ViewOfShape, fitting_hull},
 };
-use softrast_mesh::Mesh;
-use softrast_views::{PaintedView, View, frame_of_masks, mask_iou, visual_hull};
+use softrast_views::{PaintedView, frame_of_masks};
 
 use crate::{
     guard::refused,
@@ -17,11 +15,6 @@ use crate::{
     views::{Camera, painted_of, views_of},
     watched::{Watch, watched},
 };
-
-/// Cells of the visual hull along its longest side, from few to many: thin parts need more of them.
-const CELLS: [usize; 3] = [32, 45, 64];
-/// More cells are worth their time if the mean `IoU` of the hull grows by so much.
-const GROWS: f64 = 0.01;
 
 /// A surface that has the masks of some views, and their normals and colours where they are given; and whether the search was not
 /// interrupted. It starts at `start`, at the visual hull if `hull`, else at a sphere. `size` 0 stands for as many pixels as the views have.
@@ -78,7 +71,10 @@ pub(crate) fn fit_mesh<'py>(
         }
         match &start {
             Some(mesh) => fit = fit.starting_at(frame.mesh(mesh)),
-            None if hull => fit = fit.starting_at(fitting_hull(&views)?),
+            None if hull => {
+                let hull = fitting_hull(&views).context("start=\"sphere\" needs no hull")?;
+                fit = fit.starting_at(hull);
+            }
             None => {}
         }
         let found = fit.progress(|step, loss| watch.step(step, steps, loss)).run()?;
@@ -113,23 +109,4 @@ pub(crate) fn paint<'py>(
     };
     let (mesh, interrupted) = watched(py, visit, true, work)?;
     Ok((parts(py, &mesh)?, !interrupted))
-}
-
-/// The visual hull in as few cells as show what the masks show.
-fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
-    let with = |cells: usize| {
-        let hull = visual_hull(views, cells).context("start=\"sphere\" needs no hull")?;
-        let iou = |view: &View| mask_iou(&silhouette_pixels(&hull, &view.camera), &view.mask);
-        let mean = views.iter().map(iou).sum::<f64>() / views.len() as f64;
-        anyhow::Ok((hull, mean))
-    };
-    let (mut mesh, mut iou) = with(CELLS[0])?;
-    for cells in &CELLS[1..] {
-        let (finer, better) = with(*cells)?;
-        if better < iou + GROWS {
-            break;
-        }
-        (mesh, iou) = (finer, better);
-    }
-    Ok(mesh)
 }
