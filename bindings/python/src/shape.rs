@@ -7,7 +7,7 @@ use softrast_inverse::{
     SolveConfig, paint_until_stopped,
     shape::{ShapeFit, ViewOfShape, fitting_hull},
 };
-use softrast_views::{PaintedView, frame_of_masks};
+use softrast_views::{PaintedView, View, frame_of_masks};
 
 use crate::{
     guard::refused,
