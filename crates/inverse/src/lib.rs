@@ -54,6 +54,7 @@ mod silhouette_pixels;
 mod softness_file;
 mod surface;
 mod targets;
+mod texture;
 pub mod triangles;
 mod vertex_model;
 
@@ -81,6 +82,7 @@ pub use silhouette_pixels::silhouette_pixels;
 pub use softness_file::{DepthSoftnessFile, NameOrFile, NamedSoftness, SoftnessFileError};
 pub use surface::Surface;
 pub use targets::Targets;
+pub use texture::{FoundTexture, paint_texture};
 pub use vertex_model::VertexModel;
 
 /// Compiles and runs the README's example.

@@ -125,8 +125,8 @@ fn cut(mut mesh: Mesh, pixels: f64) -> Mesh {
     mesh
 }
 
-/// The renderer for a mesh with these vertex depths over all views.
-fn renderer(
+/// What draws a mesh whose vertices have these depths in all views.
+pub(crate) fn renderer(
     mesh: &Mesh,
     faces: &Arc<[[u32; 3]]>,
     size: usize,

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use softrast_mesh::Mesh;
 use softrast_raster::{NEAR, Pinhole};
 
-use crate::Frame;
+use crate::{Atlas, Frame};
 
 /// Samples along each side of a pixel, unless there are too many.
 const SAMPLES: usize = 4;
@@ -20,29 +20,50 @@ const MOST_SAMPLES: usize = 1 << 24;
 /// interpolated in perspective. A mesh without colours is white. Faces with a corner behind the camera are not drawn. Mesh and camera may
 /// be anywhere, in any unit.
 pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
+    shown_pixels(mesh, camera, |number, weights| {
+        let corners = mesh.faces()[number];
+        let colours = corners.map(|v| mesh.colours().map_or([1.0; 3], |all| all[v as usize]));
+        [0, 1, 2].map(|k| (0..3).map(|corner| weights[corner] * colours[corner][k]).sum::<f64>())
+    })
+}
+
+/// The same of a mesh with this atlas, whose colour between the texels each sample shows.
+///
+/// # Panics
+///
+/// If the atlas is that of a mesh of fewer faces.
+pub fn textured_pixels(mesh: &Mesh, atlas: &Atlas, camera: &Pinhole) -> [Vec<f64>; 4] {
+    shown_pixels(mesh, camera, |number, weights| {
+        let corners = atlas.corners()[number].map(|k| atlas.coordinates()[k as usize]);
+        let sum = |k: usize| (0..3).map(|corner| weights[corner] * corners[corner][k]).sum();
+        atlas.colour_at([0, 1].map(sum))
+    })
+}
+
+/// The same, of what faces show at these weights of their corners.
+fn shown_pixels(
+    mesh: &Mesh,
+    camera: &Pinhole,
+    colour: impl Fn(usize, [f64; 3]) -> [f64; 3] + Sync,
+) -> [Vec<f64>; 4] {
     let pixels = camera.size.pixels();
     let each = (1..=SAMPLES).rev().find(|n| n * n * pixels <= MOST_SAMPLES).unwrap_or(1);
     let (columns, rows) = (camera.size.width, camera.size.height);
     let near = NEAR * Frame::of_cameras(mesh, [camera]).unit;
     let seen: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
-    let share = 1.0 / (each * each) as f64;
-    let of_band = |band: usize| {
-        let (first, end) = (each * band * BAND, each * rows.min((band + 1) * BAND));
-        let width = each * columns;
-        let mut nearest = vec![[f64::INFINITY, 0.0, 0.0, 0.0]; width * (end - first)];
-        for face in mesh.faces() {
+    nearest.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(band, nearest)| {
+        let first = band * BAND;
+        for (number, face) in mesh.faces().iter().enumerate() {
             let corners = face.map(|v| {
                 let [x, y, z] = seen[v as usize];
                 // The centre of the first sample is (0, 0).
                 [x * each as f64 - 0.5, y * each as f64 - 0.5, z]
             });
-            let colours = face.map(|v| mesh.colours().map_or([1.0; 3], |all| all[v as usize]));
-            samples(corners, near, width, first..end, |x, y, depth, weights| {
+            let rows = first..(first + BAND).min(height);
+            samples(corners, near, width, rows, |x, y, depth, weights| {
                 let sample = &mut nearest[(y - first) * width + x];
                 if depth < sample[0] {
-                    let [r, g, b] = [0, 1, 2].map(|k| {
-                        (0..3).map(|corner| weights[corner] * colours[corner][k]).sum::<f64>()
-                    });
+                    let [r, g, b] = colour(number, weights);
                     *sample = [depth, r, g, b];
                 }
             });
@@ -140,6 +161,32 @@ mod tests {
         assert!(close(&red, [1.0, 1.0, 0.5, 0.0]), "{red:?}");
         assert!(close(&blue, [0.0, 0.0, 0.5, 1.0]), "{blue:?}");
         assert!(green.iter().all(|&x| x == 0.0) && covered.iter().all(|&x| x == 1.0));
+    }
+
+    #[test]
+    fn a_texture_is_seen_between_its_texels() {
+        // A floor with a picture of two texels, seen from above: red at the left, blue at the right, and a mean between them.
+        let positions = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let mesh =
+            Mesh::new(positions.map(|[x, y]| [x, y, 2.0]).to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+        let places = positions.map(|[x, y]| [0.5 + 0.25 * x, 0.5 - 0.5 * y]).to_vec();
+        let mut picture = image::RgbImage::new(2, 1);
+        (picture.get_pixel_mut(0, 0).0, picture.get_pixel_mut(1, 0).0) = ([255, 0, 0], [0, 0, 255]);
+        let mut file = std::io::Cursor::new(vec![]);
+        picture.write_to(&mut file, image::ImageFormat::Png).unwrap();
+        let texture = softrast_mesh::Texture::new(places, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let texture = texture.with_picture(file.into_inner()).unwrap();
+        let mesh = mesh.unwrap().with_texture(texture).unwrap();
+        let atlas = Atlas::of(&mesh, 100).0.unwrap();
+        let [red, green, blue, covered] = textured_pixels(&mesh, &atlas, &camera());
+        assert!(covered.iter().all(|&x| x == 1.0) && green.iter().all(|&x| x == 0.0));
+        for (k, (red, blue)) in red.iter().zip(&blue).enumerate() {
+            let expected = 0.875 - 0.25 * (k % 4) as f64;
+            assert!(
+                (red - expected).abs() < 1e-6 && (blue - 1.0 + expected).abs() < 1e-6,
+                "{k}: {red}"
+            );
+        }
     }
 
     #[test]

@@ -35,7 +35,7 @@ mod views;
 
 pub use atlas::{Atlas, painted_by_texture};
 pub use cameras::{CameraFile, Distortion, Lens, PoseFile, colmap_pose, find_mask, load_views};
-pub use coloured_pixels::coloured_pixels;
+pub use coloured_pixels::{coloured_pixels, textured_pixels};
 pub use cut_sides::cut_sides;
 pub use frame::{Frame, bounding_ball};
 pub use hull::{VisualHull, frame_of_masks, visual_hull};

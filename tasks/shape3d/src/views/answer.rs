@@ -15,13 +15,14 @@ use softrast_lab::{
 use softrast_mesh::Mesh;
 use softrast_views::{Frame, View, faces_across_note};
 
-use super::painted::Colours;
+use super::{painted::Colours, textured::Textured};
 use crate::Args;
 
 /// Files of every result, and those of one in colour.
 const MESHES: [&str; 3] = ["mesh.obj", "mesh.ply", "mesh.glb"];
 const VIEWS: &str = "views.png";
-const IN_COLOUR: [&str; 2] = ["colours.png", "textured.glb"];
+const IN_COLOUR: [&str; 5] =
+    ["colours.png", "textured.glb", "textured.obj", "textured.mtl", "textured.png"];
 
 /// Names of all files of a result.
 pub(super) fn names(in_colour: bool) -> impl Iterator<Item = &'static str> {
@@ -47,6 +48,10 @@ impl Scored {
         self.colours.as_ref()?.psnr
     }
 
+    fn psnr_of_vertices(&self) -> Option<f64> {
+        self.colours.as_ref()?.psnr_of_vertices
+    }
+
     /// In words.
     fn scores(&self) -> String {
         let psnr = self.psnr().map(|psnr| format!(", PSNR {psnr:.2} dB")).unwrap_or_default();
@@ -67,6 +72,10 @@ struct Summary {
     held_out: Option<f64>,
     /// In decibels, of the same two parts.
     psnr: [Option<f64>; 2],
+    /// The same of the colours of vertices.
+    psnr_of_vertices: [Option<f64>; 2],
+    /// Texels a side of the texture, and its charts.
+    texture: Option<[usize; 2]>,
     path: PathBuf,
     seconds: f64,
 }
@@ -94,7 +103,7 @@ impl Pictures {
 pub(super) fn answer(
     given: &Given<'_, Args>,
     mesh: &Mesh,
-    textured: Option<&Mesh>,
+    textured: Option<&Textured>,
     scored: &[Scored],
     notes: Vec<String>,
     seconds: f64,
@@ -104,6 +113,9 @@ pub(super) fn answer(
         train: mean(scored, false, iou).unwrap_or(f64::NAN),
         held_out: mean(scored, true, iou),
         psnr: [false, true].map(|held_out| mean(scored, held_out, Scored::psnr)),
+        psnr_of_vertices: [false, true]
+            .map(|held_out| mean(scored, held_out, Scored::psnr_of_vertices)),
+        texture: textured.and_then(|textured| textured.found),
         path: given.folder().join(MESHES[0]),
         seconds,
     };
@@ -138,9 +150,13 @@ pub(super) fn answer(
         files.push((IN_COLOUR[0].to_owned(), colours));
     }
     if let Some(textured) = textured {
-        files.push((IN_COLOUR[1].to_owned(), textured.to_glb()));
-        let holds = "the mesh with its colours as a texture, for viewers and engines";
-        beside.push(Beside::new(IN_COLOUR[1], holds));
+        let [_, glb, obj, mtl, png] = IN_COLOUR;
+        files.push((glb.to_owned(), textured.mesh.to_glb()));
+        files.push((obj.to_owned(), textured.obj(mtl).into_bytes()));
+        files.push((mtl.to_owned(), Textured::mtl(png).into_bytes()));
+        files.push((png.to_owned(), textured.picture().to_vec()));
+        beside.push(Beside::new(glb, "the mesh with a texture, for viewers and engines"));
+        beside.push(Beside::new(obj, "the same as text, with textured.mtl and textured.png"));
     }
     let holds = ["the mesh as text", "the mesh for mesh tools", "the mesh for viewers and engines"];
     beside.extend(MESHES.into_iter().zip(holds).map(|(file, holds)| Beside::new(file, holds)));
@@ -150,7 +166,7 @@ pub(super) fn answer(
 }
 
 fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
-    let Summary { train, held_out, psnr: [psnr, aside_psnr], path, seconds } = summary;
+    let Summary { train, held_out, psnr: [psnr, aside_psnr], path, seconds, .. } = summary;
     let (vertices, faces) = (mesh.positions().len(), mesh.faces().len());
     let head = [
         format!("3D SHAPE from {}", counted(scored.len(), "view")),
@@ -272,7 +288,7 @@ fn table(scored: &[Scored], in_colour: bool) -> Table {
 }
 
 fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) -> Value {
-    let Summary { train, held_out, psnr, path, seconds } = summary;
+    let Summary { train, held_out, psnr, path, seconds, .. } = summary;
     let mut json = json!({
         "train_iou": train,
         "held_out_iou": held_out,
@@ -290,6 +306,11 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
     });
     if mesh.colours().is_some() {
         (json["train_psnr"], json["held_out_psnr"]) = (json!(psnr[0]), json!(psnr[1]));
+        let [train, held_out] = summary.psnr_of_vertices;
+        json["psnr_of_vertices"] = json!({"train": train, "held_out": held_out});
+        json["texture"] = json!(
+            summary.texture.map(|[size, charts]| json!({"size": size, "charts": charts}))
+        );
         for (view, one) in json["views"].as_array_mut().into_iter().flatten().zip(scored) {
             view["psnr"] = json!(one.psnr());
         }

@@ -2,7 +2,7 @@ use std::{ffi::OsString, path::PathBuf};
 
 use clap::ValueEnum;
 use softrast_cli::MaskFlags;
-use softrast_inverse::shape::ShapeFit;
+use softrast_inverse::{FoundTexture, shape::ShapeFit};
 use softrast_lab::parse::positive;
 
 /// Pictures and the cameras that took them.
@@ -24,6 +24,10 @@ pub struct Views {
     /// Let the colours of the pictures pull the shape too, and give them to the mesh. With --mesh the shape is known, in the world units of the cameras, and stays
     #[arg(long)]
     pub colour: bool,
+
+    /// Texels a side of the texture of --colour, from 64 to 4096 [default: about one for each pixel that shows the surface, up to 2048]
+    #[arg(long, value_name = "N", requires = "colour", value_parser = clap::value_parser!(u32).range(FoundTexture::SIZES[0] as i64..=FoundTexture::SIZES[1] as i64))]
+    pub texture_size: Option<u32>,
 
     /// Let normals pull the shape: red, green and blue are (n + 1) / 2 of a normal n in the axes of the world, in the pictures, or in those of a folder with
     /// their names

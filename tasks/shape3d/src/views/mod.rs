@@ -7,6 +7,7 @@ mod problem;
 mod solve;
 mod surface;
 mod template;
+mod textured;
 
 pub use flags::{Begin, Views};
 pub(crate) use solve::solve_views;

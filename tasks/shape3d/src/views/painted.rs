@@ -8,6 +8,7 @@ use softrast_mesh::Mesh;
 use softrast_raster::ImageSize;
 use softrast_views::{PaintedView, coloured_pixels};
 
+use super::textured::Textured;
 use crate::Args;
 
 /// On spot with its shape known, 30 steps at 0.1 end at 31.4 dB on views kept aside, 40 at 0.05 at 32.6, 60 at 34.3.
@@ -18,22 +19,28 @@ const SIZE: usize = 128;
 
 /// What a view shows in colour, and the result from there.
 pub(super) struct Colours {
-    /// In decibels.
+    /// In decibels: of the texture, or else of the colours of vertices.
     pub(super) psnr: Option<f64>,
+    /// Of the colours of vertices.
+    pub(super) psnr_of_vertices: Option<f64>,
     /// The picture and the result over black, for a page.
     pub(super) pair: [RgbImage; 2],
 }
 
 impl Colours {
-    pub(super) fn new(view: &PaintedView, mesh: &Mesh) -> Self {
+    /// Of a mesh with colours at its vertices, and one with the texture.
+    pub(super) fn new(view: &PaintedView, mesh: &Mesh, textured: Option<&Textured>) -> Self {
         let ImageSize { height, width } = view.view.camera.size;
         let image = |planes: Vec<f64>| for_page(rgb_from_planes(&planes, width, height));
-        let drawn = coloured_pixels(mesh, &view.view.camera);
+        let camera = &view.view.camera;
+        let of_vertices = coloured_pixels(mesh, camera);
+        let psnr_of_vertices = view.psnr_of(&of_vertices);
+        let drawn = textured.and_then(|textured| textured.pixels(camera)).unwrap_or(of_vertices);
         let psnr = view.psnr_of(&drawn);
         let picture = view.over_black.iter().flat_map(|channel| channel.pixels());
         let picture = image(picture.map(|&x| f64::from(x)).collect());
         let [red, green, blue, _] = drawn;
-        Self { psnr, pair: [picture, image([red, green, blue].concat())] }
+        Self { psnr, psnr_of_vertices, pair: [picture, image([red, green, blue].concat())] }
     }
 }
 

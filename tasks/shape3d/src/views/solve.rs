@@ -5,7 +5,7 @@ use std::{
 
 use anyhow::{Context, ensure};
 use softrast_cli::{Answer, Given};
-use softrast_inverse::{baked, silhouette_pixels};
+use softrast_inverse::silhouette_pixels;
 use softrast_lab::{Error, for_page, format::counted, overlay};
 use softrast_mesh::Mesh;
 use softrast_views::{
@@ -17,6 +17,7 @@ use super::{
     flags::{HoldOut, Views},
     painted::{self, Colours},
     surface, template,
+    textured::{self, Textured},
 };
 use crate::Args;
 
@@ -114,7 +115,8 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     // A surface that is looked for brings its colours.
     let paints = flags.colour && (args.mesh.is_some() || args.template.is_some());
     let of_colours = if paints { painted::config(given).steps } else { 0 };
-    let steps = of_shape + of_colours;
+    let of_texture = if flags.colour { textured::STEPS } else { 0 };
+    let steps = of_shape + of_colours + of_texture;
     let mut progress = given.progress(steps)?;
     let mut mesh = match (&args.mesh, &args.template) {
         (Some(path), _) => Mesh::load(path)?,
@@ -143,7 +145,10 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
             })?,
             false => mesh.clone(),
         };
-        textured = Some(baked(&mesh, &painted)?);
+        let size = flags.texture_size.map(|size| size as usize);
+        textured = Some(Textured::new(&mesh, &painted, &to_paint, size, |step, loss| {
+            progress.step(of_shape + of_colours + step, loss)
+        })?);
         mesh = painted;
     }
     progress.finish();
@@ -151,7 +156,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let score = |(k, view): (usize, &View), painted: &[PaintedView], held_out: bool| {
         let silhouette = silhouette_pixels(&mesh, &view.camera);
         let iou = mask_iou(&silhouette, &view.mask);
-        let colours = painted.get(k).map(|view| Colours::new(view, &mesh));
+        let colours = painted.get(k).map(|view| Colours::new(view, &mesh, textured.as_ref()));
         let overlay = for_page(overlay(&silhouette, view.mask.pixels(), view.camera.size.width));
         Scored { view: view.clone(), overlay, iou, colours, held_out }
     };

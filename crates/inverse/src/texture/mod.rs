@@ -1,0 +1,115 @@
+//! A texture of a surface, found from views of it.
+
+mod charts;
+mod fit;
+mod packing;
+mod texels;
+mod triangle;
+
+use anyhow::ensure;
+use softrast_mesh::Mesh;
+use softrast_views::PaintedView;
+
+use self::{fit::Fit, packing::Layout, texels::Texels};
+
+/// Texels a side.
+const SIZES: [usize; 2] = [64, 4096];
+/// The most that are chosen where nobody asks for a number.
+const MOST: usize = 2048;
+/// The part of a square that charts cover, about.
+const COVERED: f64 = 0.6;
+
+/// A mesh with a texture that was found.
+#[derive(Debug)]
+pub struct FoundTexture {
+    /// The mesh, its faces as they were, without colours of vertices.
+    pub mesh: Mesh,
+    /// Texels a side.
+    pub size: usize,
+    /// Parts of the surface that lie beside each other on the picture.
+    pub charts: usize,
+    /// The error of `told` that ended the search early; the texture is as it was then.
+    pub stopped: Option<anyhow::Error>,
+}
+
+impl FoundTexture {
+    /// How often `told` of [`paint_texture`] is called after its first call.
+    pub const STEPS: usize = fit::STEPS;
+    /// Fewest and most texels a side.
+    pub const SIZES: [usize; 2] = SIZES;
+}
+
+/// Texels a side, a power of two, with about one for each pixel of the pictures that shows a place of the mesh from where it is largest.
+fn texture_size(mesh: &Mesh, views: &[PaintedView]) -> usize {
+    let [low, high] = mesh.bounds();
+    let middle = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
+    let pixel = |view: &PaintedView| {
+        let camera = &view.view.camera;
+        let depth = camera.transform(middle)[2];
+        if depth > 0.0 { depth / camera.focal[0].max(camera.focal[1]) } else { f64::INFINITY }
+    };
+    let pixel = views.iter().map(pixel).fold(f64::INFINITY, f64::min);
+    let side = (mesh.area() / COVERED).sqrt() / pixel;
+    let side = if side.is_finite() { side.ceil() as usize } else { 0 };
+    side.clamp(SIZES[0], MOST).next_power_of_two()
+}
+
+/// The mesh with a texture that some views show, of `size` × `size` texels, or of about one for each pixel of the pictures, found by the gradient of what a [`ColourRenderer`](softrast_raster::ColourRenderer)
+/// draws of it. Its shape stays. Mesh and cameras may be anywhere, in any unit.
+///
+/// The surface is cut into charts, each seen along an axis, and these are packed with margins that have the colours beside them. Texels start as the
+/// colours of the vertices of `fine` show them: the same mesh, cut by [`Mesh::subdivided`] some times. What no view shows stays so. A pixel counts as much
+/// as its mask says, times the squared cosine between the surface and the direction to the camera. `told` gets the steps taken and the mean squared
+/// difference. It runs on the CPU, and its result does not depend on the number of threads.
+///
+/// # Errors
+///
+/// If `size` is not one of [`FoundTexture::SIZES`] or between them, or too small for the charts; if there is no view, a mask is empty or full, or no camera has the mesh before it;
+/// if `fine` has no colours, or is not the mesh after some cuts.
+pub fn paint_texture(
+    mesh: &Mesh,
+    fine: &Mesh,
+    views: &[PaintedView],
+    size: Option<usize>,
+    told: impl FnMut(usize, f64) -> anyhow::Result<()>,
+) -> anyhow::Result<FoundTexture> {
+    let (faces, parts) = (mesh.faces().len(), fine.faces().len());
+    let cuts = (parts / faces.max(1)).max(1).ilog(4);
+    ensure!(fine.colours().is_some(), "a texture starts from colours of vertices");
+    ensure!(
+        faces << (2 * cuts) == parts,
+        "a mesh of {parts} faces is not one of {faces} whose faces were cut into four"
+    );
+    ensure!(!views.is_empty(), "a texture needs a view");
+    let [least, most] = SIZES;
+    ensure!(
+        size.is_none_or(|size| (least..=most).contains(&size)),
+        "a texture has from {least} to {most} texels a side"
+    );
+    let clock = std::time::Instant::now();
+    let layout = match size {
+        Some(size) => Layout::of(mesh, size)?,
+        None => {
+            let mut size = texture_size(mesh, views);
+            // Margins of many charts take more room than there is for their faces.
+            loop {
+                match Layout::of(mesh, size) {
+                    Err(_) if size < most => size *= 2,
+                    layout => break layout?,
+                }
+            }
+        }
+    };
+    eprintln!("layout {:?} charts {}", clock.elapsed(), layout.charts);
+    let mut texels = Texels::of(&layout, fine);
+    eprintln!("texels {:?}", clock.elapsed());
+    let fit = Fit::new(mesh, &layout, views)?;
+    eprintln!("fit new {:?}", clock.elapsed());
+    let stopped = fit.run(&mut texels, told).err();
+    eprintln!("fit run {:?}", clock.elapsed());
+    texels.fill();
+    let charts = layout.charts;
+    let mesh = texels.on(mesh, &layout)?;
+    eprintln!("written {:?}", clock.elapsed());
+    Ok(FoundTexture { mesh, size: layout.size, charts, stopped })
+}
