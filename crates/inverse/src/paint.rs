@@ -126,7 +126,7 @@ fn cut(mut mesh: Mesh, pixels: f64) -> Mesh {
 }
 
 /// What draws a mesh whose vertices have these depths in all views.
-pub(crate) fn renderer(
+fn renderer(
     mesh: &Mesh,
     faces: &Arc<[[u32; 3]]>,
     size: usize,

@@ -48,7 +48,45 @@ fn shown_pixels(
 ) -> [Vec<f64>; 4] {
     let pixels = camera.size.pixels();
     let each = (1..=SAMPLES).rev().find(|n| n * n * pixels <= MOST_SAMPLES).unwrap_or(1);
-    let (columns, rows) = (camera.size.width, camera.size.height);
+    let share = 1.0 / (each * each) as f64;
+    let mut image = [(); 4].map(|()| vec![0.0; pixels]);
+    let width = each * camera.size.width;
+    let nearest = nearest_samples(mesh, camera, each, [0.0; 3], colour);
+    for (k, (_, [r, g, b])) in nearest.into_iter().enumerate().filter(|(_, s)| s.0.is_finite()) {
+        let pixel = k / width / each * camera.size.width + k % width / each;
+        for (channel, value) in image.iter_mut().zip([r, g, b, 1.0]) {
+            channel[pixel] += share * value;
+        }
+    }
+    image
+}
+
+/// The nearest face at each of `each` × `each` samples of every pixel, row by row of samples: its depth, and what `shown` makes of its number and the
+/// weights of its corners in space. Where there is none, an infinite depth and `empty`.
+///
+/// Faces with a corner behind the camera are left out. Mesh and camera may be anywhere, in any unit.
+///
+/// ```
+/// use softrast_mesh::icosphere;
+/// use softrast_raster::Pinhole;
+/// use softrast_views::nearest_samples;
+///
+/// let camera = Pinhole::look_at([0.0, 0.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 8);
+/// let samples = nearest_samples(&icosphere(2), &camera, 2, None, |face, _| Some(face));
+/// assert_eq!(samples.len(), 16 * 16);
+/// let (depth, face) = samples[8 * 16 + 8];
+/// assert!((depth - 3.0).abs() < 0.05 && face.is_some());
+/// assert_eq!(samples[0], (f64::INFINITY, None));
+/// ```
+pub fn nearest_samples<T: Copy + Send>(
+    mesh: &Mesh,
+    camera: &Pinhole,
+    each: usize,
+    empty: T,
+    shown: impl Fn(usize, [f64; 3]) -> T + Sync,
+) -> Vec<(f64, T)> {
+    let (width, height) = (each * camera.size.width, each * camera.size.height);
+    let mut nearest = vec![(f64::INFINITY, empty); width * height];
     let near = NEAR * Frame::of_cameras(mesh, [camera]).unit;
     let seen: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
     nearest.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(band, nearest)| {
@@ -62,26 +100,14 @@ fn shown_pixels(
             let rows = first..(first + BAND).min(height);
             samples(corners, near, width, rows, |x, y, depth, weights| {
                 let sample = &mut nearest[(y - first) * width + x];
-                if depth < sample[0] {
-                    let [r, g, b] = colour(number, weights);
-                    *sample = [depth, r, g, b];
+                if depth < sample.0 {
+                    debug_assert!(depth > 0.0, "depth {depth}");
+                    *sample = (depth, shown(number, weights));
                 }
             });
         }
-        let mut band = vec![[0.0; 4]; columns * (end - first) / each];
-        for (k, [depth, r, g, b]) in
-            nearest.into_iter().enumerate().filter(|(_, s)| s[0].is_finite())
-        {
-            debug_assert!(depth > 0.0, "depth {depth}");
-            let pixel = &mut band[k / width / each * columns + k % width / each];
-            for (channel, value) in pixel.iter_mut().zip([r, g, b, 1.0]) {
-                *channel += share * value;
-            }
-        }
-        band
-    };
-    let bands: Vec<Vec<[f64; 4]>> = (0..rows.div_ceil(BAND)).into_par_iter().map(of_band).collect();
-    [0, 1, 2, 3].map(|k| bands.iter().flatten().map(|pixel| pixel[k]).collect())
+    });
+    nearest
 }
 
 /// Calls `show` for each sample of some rows inside a triangle: its column and row, its depth, and the barycentric weights in space.

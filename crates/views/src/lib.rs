@@ -30,12 +30,14 @@ mod mask_rules;
 mod painted_view;
 mod picture;
 mod picture_file;
+mod texel_reads;
+mod unwrapped;
 mod view;
 mod views;
 
 pub use atlas::{Atlas, painted_by_texture};
 pub use cameras::{CameraFile, Distortion, Lens, PoseFile, colmap_pose, find_mask, load_views};
-pub use coloured_pixels::{coloured_pixels, textured_pixels};
+pub use coloured_pixels::{coloured_pixels, nearest_samples, textured_pixels};
 pub use cut_sides::cut_sides;
 pub use frame::{Frame, bounding_ball};
 pub use hull::{VisualHull, frame_of_masks, visual_hull};
@@ -44,6 +46,8 @@ pub use mask_rules::MaskRules;
 pub use painted_view::PaintedView;
 pub use picture::Picture;
 pub use picture_file::PictureFile;
+pub use texel_reads::{TexelPull, TexelReads};
+pub use unwrapped::{Unwrapped, covered_texels};
 pub use view::{View, camera_json, faces_across, faces_across_note, mask_iou, reading_notes};
 pub use views::Views;
 

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::{Orbit, Pinhole};
 use softrast_test_kit::Program;
-use softrast_views::coloured_pixels;
+use softrast_views::{coloured_pixels, painted_by_texture};
 
 /// Runs `shape3d solve` with results in `out`: its JSON, or its error line.
 fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
@@ -28,13 +28,18 @@ fn ball() -> Mesh {
 
 /// Pictures of the ball in a folder: transparent, or over white with separate masks.
 fn pictures(folder: &Path, opaque: bool) {
+    pictures_of(&ball(), folder, opaque);
+}
+
+/// The same of another mesh.
+fn pictures_of(mesh: &Mesh, folder: &Path, opaque: bool) {
     let size = [60usize, 44];
     let frame = |k: usize| {
         let elevation_deg = [-50.0, 0.0, 50.0][k % 3];
         let orbit =
             Orbit { distance: 4.0, elevation_deg, azimuth_deg: 31.0 * k as f64, fov_deg: 40.0 };
         let camera = Pinhole::from_orbit(&orbit, [size[1], size[0]]);
-        let [red, green, blue, covered] = coloured_pixels(&ball(), &camera);
+        let [red, green, blue, covered] = coloured_pixels(mesh, &camera);
         let byte = |x: f64| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
         let at = |x: u32, y: u32| y as usize * size[0] + x as usize;
         let of = |pixel: usize, colour: &dyn Fn(f64) -> f64| {
@@ -115,6 +120,26 @@ fn a_known_shape_gets_its_colours_back_over_nothing_and_over_white() {
         let picture = textured.texture().unwrap().picture().unwrap();
         let picture = image::load_from_memory(picture).unwrap().into_rgb8();
         assert!(picture.pixels().any(|texel| texel.0[0].abs_diff(texel.0[2]) > 100));
+        // As `pose --colour` reads it, with the colours of the ball.
+        let painted = painted_by_texture(&textured, 0).0.unwrap();
+        let off = |(p, colour): (&[f64; 3], &[f64; 3])| {
+            let known = [p[0], p[1] / 0.7, p[2]].map(|x| 0.5 + 0.4 * (3.0 * x).sin());
+            (0..3).map(|k| (known[k] - colour[k]).powi(2)).sum::<f64>() / 3.0
+        };
+        let pairs = painted.positions().iter().zip(painted.colours().unwrap());
+        let mean = pairs.map(off).sum::<f64>() / painted.positions().len() as f64;
+        assert!(mean < 0.03f64.powi(2), "opaque: {opaque}: {mean}");
+        // The same picture beside an OBJ file.
+        let obj = Mesh::load_textured(out.join("textured.obj")).unwrap().0;
+        assert_eq!(obj.faces().len(), ball().faces().len());
+        let beside = fs::read(out.join("textured.png")).unwrap();
+        for mesh in [&obj, &textured] {
+            assert_eq!(mesh.texture().unwrap().picture().unwrap(), beside);
+            assert_eq!(mesh.colours(), None);
+        }
+        let side = picture.width();
+        assert_eq!(number(&found["texture"], "size"), f64::from(side));
+        assert!(side.is_power_of_two() && side == picture.height(), "{side}");
     }
 }
 
@@ -133,7 +158,29 @@ fn shape_and_colours_are_found_together_and_without_the_flag_there_are_none() {
     assert!(!out.join("plain/colours.png").exists());
 }
 
-/// A hundredth of the size, and in metres on a map.
+#[test]
+fn a_texture_shows_what_is_finer_than_the_faces() {
+    let fine = ball().subdivided().subdivided();
+    let stripes = |p: &[f64; 3]| p.map(|x| 0.5 + 0.45 * (9.0 * x).sin());
+    let colours = fine.positions().iter().map(stripes).collect();
+    let folder = tempfile::tempdir().unwrap();
+    pictures_of(&fine.with_colours(colours).unwrap(), folder.path(), false);
+    let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
+    let words = ["--views", views, "--hold-out", "2", "--steps", "60", "--faces", "300"];
+    let words = [&words[..], &["--colour", "--texture-size", "100"]].concat();
+    let found = run(&out, &words).unwrap();
+    let [texture, vertices] = [&found["held_out_psnr"], &found["psnr_of_vertices"]["held_out"]];
+    let gain = texture.as_f64().unwrap() - vertices.as_f64().unwrap();
+    assert!(gain > 1.0, "{found}");
+    let picture = image::open(out.join("textured.png")).unwrap();
+    assert_eq!((picture.width(), picture.height()), (100, 100));
+    // The same with the same flags.
+    let before = fs::read(out.join("textured.glb")).unwrap();
+    run(&out, &words).unwrap();
+    assert_eq!(fs::read(out.join("textured.glb")).unwrap(), before);
+}
+
+/// A hundredth of the size, in metres of a map.
 #[test]
 fn colours_are_found_on_a_map_and_in_a_small_unit() {
     let folder = tempfile::tempdir().unwrap();
@@ -202,7 +249,10 @@ fn what_does_not_go_together_is_one_line() {
         &["--smooth", "--mesh"],
     );
     error(&["--views", views, "--colour", "--mesh", "no.ply"], &["no.ply"]);
-    // A mesh that lies elsewhere is visible in no view, which is reported.
+    error(&["--views", views, "--texture-size", "256"], &["--colour"]);
+    error(&["--views", views, "--colour", "--texture-size", "63"], &["63", "64..=4096"]);
+    error(&["--views", views, "--colour", "--texture-size", "5000"], &["5000", "64..=4096"]);
+    // A mesh that lies elsewhere is painted by nothing: that is said.
     let words = ["--views", views, "--colour", "--mesh", far.to_str().unwrap(), "--steps", "1"];
     match run(&out.join("far"), &words) {
         Ok(found) => {

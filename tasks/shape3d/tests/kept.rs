@@ -100,10 +100,11 @@ fn results_in_colour_do_not_stay_beside_later_ones_without() {
     };
     let there = |name: &str| folder.path().join("out").join(name).exists();
     run("--views fox --template mine.obj --colour --out out");
-    assert!(["colours.png", "textured.glb", "mesh.obj"].into_iter().all(there));
+    let textured = ["textured.glb", "textured.obj", "textured.mtl", "textured.png"];
+    assert!(textured.into_iter().chain(["colours.png", "mesh.obj"]).all(there));
     fs::write(folder.path().join("out/notes.txt"), "mine").unwrap();
     run("--views fox --template mine.obj --out out");
-    assert!(!there("colours.png") && !there("textured.glb") && there("mesh.obj"));
+    assert!(!there("colours.png") && !textured.into_iter().any(there) && there("mesh.obj"));
     run("--out out");
     assert!(!there("mesh.obj") && there("notes.txt") && there("curve.csv"));
 }

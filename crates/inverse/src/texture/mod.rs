@@ -1,21 +1,22 @@
 //! A texture of a surface, found from views of it.
 
-mod charts;
 mod fit;
-mod packing;
 mod texels;
-mod triangle;
+mod unseen;
 
 use anyhow::ensure;
 use softrast_mesh::Mesh;
-use softrast_views::PaintedView;
+use softrast_views::{PaintedView, TexelReads, Unwrapped};
 
-use self::{fit::Fit, packing::Layout, texels::Texels};
+use self::{texels::Texels, unseen::without_unseen};
 
 /// Texels a side.
 const SIZES: [usize; 2] = [64, 4096];
 /// The most that are chosen where nobody asks for a number.
 const MOST: usize = 2048;
+/// Power of the cosine between the surface and the direction to a camera by which a pixel counts: a view from the side shows it blurred, and where the
+/// surface is a little off, another place of it. On spot, held out, 0 ends at 31.07 dB, 1 at 31.12, 2 at 31.13.
+const FACING: f64 = 2.0;
 /// The part of a square that charts cover, about.
 const COVERED: f64 = 0.6;
 
@@ -86,30 +87,26 @@ pub fn paint_texture(
         size.is_none_or(|size| (least..=most).contains(&size)),
         "a texture has from {least} to {most} texels a side"
     );
-    let clock = std::time::Instant::now();
     let layout = match size {
-        Some(size) => Layout::of(mesh, size)?,
+        Some(size) => Unwrapped::of(mesh, size)?,
         None => {
             let mut size = texture_size(mesh, views);
             // Margins of many charts take more room than there is for their faces.
             loop {
-                match Layout::of(mesh, size) {
+                match Unwrapped::of(mesh, size) {
                     Err(_) if size < most => size *= 2,
                     layout => break layout?,
                 }
             }
         }
     };
-    eprintln!("layout {:?} charts {}", clock.elapsed(), layout.charts);
-    let mut texels = Texels::of(&layout, fine);
-    eprintln!("texels {:?}", clock.elapsed());
-    let fit = Fit::new(mesh, &layout, views)?;
-    eprintln!("fit new {:?}", clock.elapsed());
-    let stopped = fit.run(&mut texels, told).err();
-    eprintln!("fit run {:?}", clock.elapsed());
+    let reads = TexelReads::new(mesh, &layout, views, FACING)?;
+    let seen = reads.sees_face();
+    let colours = without_unseen(fine, |part| seen[part >> (2 * cuts)]);
+    let mut texels = Texels::of(&layout, &fine.clone().with_colours(colours)?);
+    let stopped = fit::fit(&reads, &mut texels, told).err();
     texels.fill();
-    let charts = layout.charts;
+    let charts = layout.charts();
     let mesh = texels.on(mesh, &layout)?;
-    eprintln!("written {:?}", clock.elapsed());
-    Ok(FoundTexture { mesh, size: layout.size, charts, stopped })
+    Ok(FoundTexture { mesh, size: layout.size(), charts, stopped })
 }

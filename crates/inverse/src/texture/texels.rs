@@ -5,7 +5,7 @@ use std::io::Cursor;
 use image::{ImageFormat, Rgb, RgbImage};
 use softrast_mesh::{Mesh, Texture};
 
-use super::{packing::Layout, triangle};
+use softrast_views::{Unwrapped, covered_texels};
 
 /// Rings of texels around a chart that are read between texels.
 const RINGS: usize = 2;
@@ -22,19 +22,19 @@ pub(super) struct Texels {
 
 impl Texels {
     /// The colours of the vertices of `fine`, which is the mesh of the layout, cut by [`Mesh::subdivided`] some times. Rings have the mean of the texels beside them.
-    pub(super) fn of(layout: &Layout, fine: &Mesh) -> Self {
-        let (size, colours) = (layout.size, fine.colours().unwrap_or_default());
+    pub(super) fn of(layout: &Unwrapped, fine: &Mesh) -> Self {
+        let (size, colours) = (layout.size(), fine.colours().unwrap_or_default());
         let mut texels =
             Self { size, colours: vec![0.0; 3 * size * size], is_read: vec![false; size * size] };
-        let cuts = (fine.faces().len() / layout.corners.len().max(1)).max(1).ilog(4);
+        let cuts = (fine.faces().len() / layout.corners().len().max(1)).max(1).ilog(4);
         let along = f64::from(1u32 << cuts);
-        for (number, &face) in layout.corners.iter().enumerate() {
+        for (number, &face) in layout.corners().iter().enumerate() {
             parts(number, cuts, &mut |part, shares| {
                 let places = shares.map(|of: [f64; 3]| {
                     [0, 1].map(|k| (0..3).map(|i| of[i] * face[i][k]).sum::<f64>() / along)
                 });
                 let of = fine.faces()[part].map(|vertex| colours[vertex as usize]);
-                triangle::texels(places, |[x, y], shares| {
+                covered_texels(places, |[x, y], shares| {
                     let texel = y as usize * size + x as usize;
                     texels.is_read[texel] = true;
                     for k in 0..3 {
@@ -81,7 +81,7 @@ impl Texels {
     }
 
     /// The mesh without colours of vertices, with the picture of these texels, in 8 bits, as a PNG file.
-    pub(super) fn on(&self, mesh: &Mesh, layout: &Layout) -> anyhow::Result<Mesh> {
+    pub(super) fn on(&self, mesh: &Mesh, layout: &Unwrapped) -> anyhow::Result<Mesh> {
         let picture = RgbImage::from_fn(self.size as u32, self.size as u32, |x, y| {
             let first = 3 * (y as usize * self.size + x as usize);
             Rgb([0, 1, 2].map(|k| (255.0 * self.colours[first + k].clamp(0.0, 1.0)).round() as u8))
@@ -162,7 +162,7 @@ mod tests {
             let colour = |p: &[f64; 3]| p.map(|x| 0.5 + 0.4 * x);
             let colours = fine.positions().iter().map(colour).collect();
             let fine = fine.with_colours(colours).unwrap();
-            let layout = Layout::of(&ball, 200).unwrap();
+            let layout = Unwrapped::of(&ball, 200).unwrap();
             let mut texels = Texels::of(&layout, &fine);
             texels.fill();
             let textured = texels.on(&ball, &layout).unwrap();

@@ -308,9 +308,8 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
         (json["train_psnr"], json["held_out_psnr"]) = (json!(psnr[0]), json!(psnr[1]));
         let [train, held_out] = summary.psnr_of_vertices;
         json["psnr_of_vertices"] = json!({"train": train, "held_out": held_out});
-        json["texture"] = json!(
-            summary.texture.map(|[size, charts]| json!({"size": size, "charts": charts}))
-        );
+        json["texture"] =
+            json!(summary.texture.map(|[size, charts]| json!({"size": size, "charts": charts})));
         for (view, one) in json["views"].as_array_mut().into_iter().flatten().zip(scored) {
             view["psnr"] = json!(one.psnr());
         }

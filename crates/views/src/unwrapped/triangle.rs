@@ -2,7 +2,7 @@
 
 /// Shows the column and the row of each texel whose middle lies in a triangle, and the shares of the corners there. Corners are in texels; the middle of
 /// the first one is (0.5, 0.5). Of triangles side by side one shows a texel on their border, up to rounding.
-pub(super) fn texels(corners: [[f64; 2]; 3], mut show: impl FnMut([i64; 2], [f64; 3])) {
+pub fn covered_texels(corners: [[f64; 2]; 3], mut show: impl FnMut([i64; 2], [f64; 3])) {
     let [a, b, c] = corners;
     let side = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
         (q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])
@@ -48,7 +48,7 @@ mod tests {
             let mut times = [[0; 6]; 6];
             for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
                 let corners = if turned { [a, c, b] } else { [a, b, c] };
-                texels(corners.map(|k: usize| square[k]), |[x, y], shares| {
+                covered_texels(corners.map(|k: usize| square[k]), |[x, y], shares| {
                     times[y as usize][x as usize] += 1;
                     assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
                 });
@@ -61,8 +61,8 @@ mod tests {
     #[test]
     fn shares_are_those_of_the_middle() {
         let mut found = Vec::new();
-        texels([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]], |at, shares| found.push((at, shares)));
+        covered_texels([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]], |at, shares| found.push((at, shares)));
         assert!(found.contains(&([0, 0], [0.5, 0.25, 0.25])), "{found:?}");
-        texels([[0.0; 2]; 3], |_, _| panic!("it has no area"));
+        covered_texels([[0.0; 2]; 3], |_, _| panic!("it has no area"));
     }
 }

@@ -6,7 +6,7 @@ use softrast_mesh::Mesh;
 use super::charts::{Chart, charts};
 
 /// Texels around each chart that belong to it, so that what is read between texels is none of another's, in a picture of half the size too.
-pub(super) const MARGIN: f64 = 2.0;
+const MARGIN: f64 = 3.0;
 /// The part of a square that charts cover at first; each try covers less, until all have room.
 const COVERED: f64 = 0.9;
 /// What a try makes of texels for each world unit.
@@ -14,22 +14,34 @@ const SMALLER: f64 = 0.96;
 /// Tries, the last with a hundredth of the texels for each world unit.
 const TRIES: i32 = 113;
 
-/// Where the corners of the faces of a mesh lie on a square picture.
-pub(super) struct Layout {
-    /// Texels a side.
-    pub(super) size: usize,
-    pub(super) charts: usize,
-    /// Corners of each face in texels, to the right and down from the corner above left.
-    pub(super) corners: Vec<[[f64; 2]; 3]>,
+/// A mesh unwrapped: where the corners of its faces lie on a square picture.
+///
+/// The surface is cut into charts, connected parts that lie flat as seen along an axis of the world, and these lie beside each other, all in one scale and
+/// with margins. No two faces cover the middle of one texel.
+///
+/// ```
+/// use softrast_mesh::icosphere;
+/// use softrast_views::Unwrapped;
+///
+/// let unwrapped = Unwrapped::of(&icosphere(3), 128)?;
+/// assert_eq!(unwrapped.charts(), 6);
+/// assert!(unwrapped.corners().as_flattened().as_flattened().iter().all(|x| (0.0..=128.0).contains(x)));
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Unwrapped {
+    size: usize,
+    charts: usize,
+    corners: Vec<[[f64; 2]; 3]>,
 }
 
-impl Layout {
+impl Unwrapped {
     /// A layout on `size` × `size` texels, all charts in the same scale, as large as they find room.
     ///
     /// # Errors
     ///
     /// If the mesh has no area, or so many charts that their margins alone need more room.
-    pub(super) fn of(mesh: &Mesh, size: usize) -> anyhow::Result<Self> {
+    pub fn of(mesh: &Mesh, size: usize) -> anyhow::Result<Self> {
         let area = mesh.area();
         ensure!(area > 0.0 && area.is_finite(), "a mesh without an area has no texture");
         let unit = area.sqrt() / (COVERED.sqrt() * size as f64);
@@ -51,8 +63,23 @@ impl Layout {
         Ok(Self { size, charts: charts.len(), corners })
     }
 
+    /// Texels a side.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The number of charts.
+    pub fn charts(&self) -> usize {
+        self.charts
+    }
+
+    /// Corners of each face in texels, to the right and down from the corner above left.
+    pub fn corners(&self) -> &[[[f64; 2]; 3]] {
+        &self.corners
+    }
+
     /// Places (u, v) of all corners, v up, those of the first face first.
-    pub(super) fn coordinates(&self) -> Vec<[f64; 2]> {
+    pub fn coordinates(&self) -> Vec<[f64; 2]> {
         let side = self.size as f64;
         self.corners.as_flattened().iter().map(|&[x, y]| [x / side, 1.0 - y / side]).collect()
     }
@@ -130,19 +157,19 @@ fn packed(charts: &[Chart], scale: f64, size: usize) -> Option<Vec<[f64; 2]>> {
 mod tests {
     use softrast_mesh::icosphere;
 
-    use super::{super::triangle, *};
+    use super::{super::triangle::covered_texels, *};
 
     #[test]
     fn charts_keep_their_margins_and_fill_more_than_half() {
         let ball = icosphere(4);
-        let layout = Layout::of(&ball, 256).unwrap();
+        let layout = Unwrapped::of(&ball, 256).unwrap();
         assert_eq!(layout.charts, 6);
         let mut owner = vec![usize::MAX; 256 * 256];
         let charts = charts(&ball, ball.area().sqrt() / (COVERED.sqrt() * 256.0));
         let mut covered = 0;
         for (number, chart) in charts.iter().enumerate() {
             for &face in &chart.faces {
-                triangle::texels(layout.corners[face], |[x, y], _| {
+                covered_texels(layout.corners[face], |[x, y], _| {
                     let texel = y as usize * 256 + x as usize;
                     assert_eq!(owner[texel], usize::MAX, "two faces on one texel");
                     (owner[texel], covered) = (number, covered + 1);
@@ -169,8 +196,8 @@ mod tests {
         let positions = ball.triangles().flatten().collect();
         let faces = (0..1280u32).map(|face| [0, 1, 2].map(|k| 3 * face + k)).collect();
         let apart = Mesh::new(positions, faces).unwrap();
-        let error = Layout::of(&apart, 64).err().unwrap().to_string();
+        let error = Unwrapped::of(&apart, 64).err().unwrap().to_string();
         assert!(error.contains("64 x 64 texels has no room for 1280 charts"), "{error}");
-        assert_eq!(Layout::of(&apart, 512).unwrap().charts, 1280);
+        assert_eq!(Unwrapped::of(&apart, 512).unwrap().charts, 1280);
     }
 }

@@ -188,7 +188,7 @@ fn without_overlap(
 /// The squares whose middle a triangle covers.
 fn squares(corners: [[f64; 2]; 3]) -> Vec<[i64; 2]> {
     let mut found = Vec::new();
-    super::triangle::texels(corners, |at, _| found.push(at));
+    super::triangle::covered_texels(corners, |at, _| found.push(at));
     found
 }
 
