@@ -1,10 +1,11 @@
 //! What views read of texels.
 
-use crate::{PaintedView, Unwrapped, nearest_samples};
 use anyhow::ensure;
 use rayon::prelude::*;
 use softrast_mesh::Mesh;
 use softrast_raster::Pinhole;
+
+use crate::{PaintedView, Unwrapped, nearest_samples};
 
 /// Pixels of the squares of all views at most, and of samples four times as many: larger squares are reduced.
 const MOST_PIXELS: f64 = (1u64 << 25) as f64;
@@ -18,7 +19,7 @@ const PARTS: usize = 4;
 const STEPS: f64 = 65535.0;
 
 /// A place between four texels.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Sample {
     /// The one above left.
     texel: u32,
@@ -28,6 +29,7 @@ struct Sample {
 }
 
 /// A pixel that counts.
+#[derive(Debug)]
 struct Pixel {
     samples: u8,
     /// What is drawn is the sum of the samples times this.
@@ -37,13 +39,15 @@ struct Pixel {
 }
 
 /// A view: its pixels, and their samples one after the other.
+#[derive(Debug)]
 struct Seen {
     pixels: Vec<Pixel>,
     samples: Vec<Sample>,
 }
 
-/// What views read of a texture, and what they should. It is linear in the texels: a pixel is the mean of 2 × 2 samples, and each sample a mean of four
-/// texels of the nearest face. A [`ColourRenderer`](softrast_raster::ColourRenderer) with narrow softnesses reads the same of
+/// What views read of a texture, and what they should: the square of each view around its mask, as many pixels as the picture has there.
+///
+/// It is linear in the texels: a pixel is the mean of 2 × 2 samples, and each sample a mean of four texels of the nearest face. A [`ColourRenderer`](softrast_raster::ColourRenderer) with narrow softnesses reads the same of
 /// [`Attributes::with_texture`](softrast_raster::Attributes::with_texture), from a mesh that may move; here the mesh stays, so where a view reads is found once.
 pub struct TexelReads {
     size: usize,
@@ -100,8 +104,14 @@ impl TexelReads {
         self.views.iter().flat_map(|view| &view.pixels).map(of).sum()
     }
 
-    /// Differences between what is read of texels, red, green and blue for each, and what is known, or black.
+    /// Differences between what is read of texels and what is known, or black. `texels` are red, green and blue, row by row from the top. The sums are the
+    /// same for any number of threads.
+    ///
+    /// # Panics
+    ///
+    /// If there are not three numbers for each texel.
     pub fn pull(&self, texels: &[f32], from_known: bool) -> TexelPull {
+        assert_eq!(texels.len(), 3 * self.size * self.size, "numbers of texels");
         let each = self.views.len().div_ceil(PARTS).max(1);
         let of_part = |views: &[Seen]| {
             let mut sum = TexelPull { half: 0.0, gradient: vec![0.0; texels.len()] };
@@ -166,7 +176,7 @@ impl Seen {
                 sees_face[face as usize] |= cosines[face as usize] > 0.0;
             }
             let samples = seen.samples.len() - before;
-            // What is mixed with what is behind the mesh says little of it.
+            // No face is there, or the backs of faces alone.
             if samples == 0 || cosine <= 0.0 {
                 seen.samples.truncate(before);
                 continue;

@@ -55,13 +55,14 @@ fn texture_size(mesh: &Mesh, views: &[PaintedView]) -> usize {
     side.clamp(SIZES[0], MOST).next_power_of_two()
 }
 
-/// The mesh with a texture that some views show, of `size` × `size` texels, or of about one for each pixel of the pictures, found by the gradient of what a [`ColourRenderer`](softrast_raster::ColourRenderer)
-/// draws of it. Its shape stays. Mesh and cameras may be anywhere, in any unit.
+/// The mesh with a texture that some views show, of `size` × `size` texels, or of about one for each pixel of the pictures. Its shape stays. Mesh and
+/// cameras may be anywhere, in any unit.
 ///
-/// The surface is cut into charts, each seen along an axis, and these are packed with margins that have the colours beside them. Texels start as the
-/// colours of the vertices of `fine` show them: the same mesh, cut by [`Mesh::subdivided`] some times. What no view shows stays so. A pixel counts as much
-/// as its mask says, times the squared cosine between the surface and the direction to the camera. `told` gets the steps taken and the mean squared
-/// difference. It runs on the CPU, and its result does not depend on the number of threads.
+/// The surface is [`Unwrapped`] into charts, whose margins have the colours beside them. Texels start as the colours of the vertices of `fine` show them: the
+/// same mesh, cut by [`Mesh::subdivided`] some times. The gradient of what the views read of the texels ([`TexelReads`]) brings these to the least squared
+/// differences to all views. A pixel counts as much as its mask says, times the squared cosine between the surface and the direction to the camera. Places
+/// that no view shows take the colours around them. `told` gets the steps taken and the mean squared difference. It runs on the CPU, and its result does not
+/// depend on the number of threads.
 ///
 /// # Errors
 ///
