@@ -37,10 +37,9 @@ impl Texels {
                 covered_texels(places, |[x, y], shares| {
                     let texel = y as usize * size + x as usize;
                     texels.is_read[texel] = true;
-                    for k in 0..3 {
-                        let level: f64 = (0..3).map(|i| shares[i] * of[i][k]).sum();
-                        texels.colours[3 * texel + k] = level as f32;
-                    }
+                    let mix = |k: usize| (0..3).map(|i| shares[i] * of[i][k]).sum::<f64>() as f32;
+                    let own = &mut texels.colours[3 * texel..3 * texel + 3];
+                    own.iter_mut().enumerate().for_each(|(k, level)| *level = mix(k));
                 });
             });
         }
