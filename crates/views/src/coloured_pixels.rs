@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use softrast_mesh::Mesh;
-use softrast_raster::{NEAR, Pinhole};
+use softrast_raster::{ImageSize, NEAR, Pinhole};
 
 use crate::{Atlas, Frame};
 
@@ -49,16 +49,24 @@ fn shown_pixels(
     let pixels = camera.size.pixels();
     let each = (1..=SAMPLES).rev().find(|n| n * n * pixels <= MOST_SAMPLES).unwrap_or(1);
     let share = 1.0 / (each * each) as f64;
-    let mut image = [(); 4].map(|()| vec![0.0; pixels]);
-    let width = each * camera.size.width;
-    let nearest = nearest_samples(mesh, camera, each, [0.0; 3], colour);
-    for (k, (_, [r, g, b])) in nearest.into_iter().enumerate().filter(|(_, s)| s.0.is_finite()) {
-        let pixel = k / width / each * camera.size.width + k % width / each;
-        for (channel, value) in image.iter_mut().zip([r, g, b, 1.0]) {
-            channel[pixel] += share * value;
+    let samples = Samples::new(mesh, camera, each);
+    let columns = camera.size.width;
+    // Samples of a few rows at a time: those of a whole picture take up to half a gigabyte.
+    let of_band = |band: usize| {
+        let nearest = samples.band(band, [0.0; 3], &colour);
+        let mut pixels = vec![[0.0; 4]; nearest.len() / (each * each)];
+        let (width, shown) =
+            (each * columns, |sample: &(usize, (f64, [f64; 3]))| sample.1.0.is_finite());
+        for (k, (_, [r, g, b])) in nearest.into_iter().enumerate().filter(shown) {
+            let pixel = &mut pixels[k / width / each * columns + k % width / each];
+            for (channel, value) in pixel.iter_mut().zip([r, g, b, 1.0]) {
+                *channel += share * value;
+            }
         }
-    }
-    image
+        pixels
+    };
+    let bands: Vec<Vec<[f64; 4]>> = samples.bands().into_par_iter().map(of_band).collect();
+    [0, 1, 2, 3].map(|k| bands.iter().flatten().map(|pixel| pixel[k]).collect())
 }
 
 /// The nearest face at each of `each` × `each` samples of every pixel, row by row of samples: its depth, and what `shown` makes of its number and the
@@ -85,20 +93,51 @@ pub fn nearest_samples<T: Copy + Send>(
     empty: T,
     shown: impl Fn(usize, [f64; 3]) -> T + Sync,
 ) -> Vec<(f64, T)> {
-    let (width, height) = (each * camera.size.width, each * camera.size.height);
-    let mut nearest = vec![(f64::INFINITY, empty); width * height];
-    let near = NEAR * Frame::of_cameras(mesh, [camera]).unit;
-    let seen: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
-    nearest.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(band, nearest)| {
-        let first = band * BAND;
+    let samples = Samples::new(mesh, camera, each);
+    let bands = samples.bands().into_par_iter();
+    let bands: Vec<Vec<(f64, T)>> = bands.map(|band| samples.band(band, empty, &shown)).collect();
+    bands.concat()
+}
+
+/// Samples of a mesh in a camera, `each` along each side of a pixel.
+struct Samples<'a> {
+    mesh: &'a Mesh,
+    /// Columns and rows of the vertices in pixels, and their depths.
+    seen: Vec<[f64; 3]>,
+    near: f64,
+    size: ImageSize,
+    each: usize,
+}
+
+impl<'a> Samples<'a> {
+    fn new(mesh: &'a Mesh, camera: &Pinhole, each: usize) -> Self {
+        let near = NEAR * Frame::of_cameras(mesh, [camera]).unit;
+        let seen = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
+        Self { mesh, seen, near, size: camera.size, each }
+    }
+
+    fn bands(&self) -> Range<usize> {
+        0..self.size.height.div_ceil(BAND)
+    }
+
+    /// Depth of the nearest face and the value of `shown` at the samples of a band of rows, row by row.
+    fn band<T: Copy>(
+        &self,
+        band: usize,
+        empty: T,
+        shown: &impl Fn(usize, [f64; 3]) -> T,
+    ) -> Vec<(f64, T)> {
+        let Self { mesh, seen, near, size, each } = self;
+        let (first, end) = (each * band * BAND, each * size.height.min((band + 1) * BAND));
+        let width = each * size.width;
+        let mut nearest = vec![(f64::INFINITY, empty); width * (end - first)];
         for (number, face) in mesh.faces().iter().enumerate() {
             let corners = face.map(|v| {
                 let [x, y, z] = seen[v as usize];
                 // The centre of the first sample is (0, 0).
-                [x * each as f64 - 0.5, y * each as f64 - 0.5, z]
+                [x * *each as f64 - 0.5, y * *each as f64 - 0.5, z]
             });
-            let rows = first..(first + BAND).min(height);
-            samples(corners, near, width, rows, |x, y, depth, weights| {
+            samples(corners, *near, width, first..end, |x, y, depth, weights| {
                 let sample = &mut nearest[(y - first) * width + x];
                 if depth < sample.0 {
                     debug_assert!(depth > 0.0, "depth {depth}");
@@ -106,8 +145,8 @@ pub fn nearest_samples<T: Copy + Send>(
                 }
             });
         }
-    });
-    nearest
+        nearest
+    }
 }
 
 /// Calls `show` for each sample of some rows inside a triangle: its column and row, its depth, and the barycentric weights in space.
