@@ -1,13 +1,13 @@
-//! A softness that adapts inside every run, against one that stays and the preset.
+//! Compares a softness that adapts within each run with a fixed one and with the preset.
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example alternating              # as many seeds as in docs/results.md
 //! cargo run --release -p compare --features studies --example alternating -- --quick   # two seeds of tiny instances, to out/alternating.md
 //! ```
 //!
-//! The strongest baseline without learning: φ goes down the inner loss along with the scene, from the searched static softness, at a
-//! rate that is chosen on training seeds of the original variant. Judged by the hard image where a run ends, on the seeds from 0 on.
-//! Writes `docs/studies/learning.md`.
+//! The strongest baseline without learning: φ descends the inner loss together with the scene, starting from the searched fixed width, at a
+//! rate chosen on training seeds of the original variant. The error is that of the hard image at the last step, on the seeds from 0. Writes
+//! `docs/studies/learning.md`.
 
 mod common;
 
@@ -25,9 +25,9 @@ use softrast_raster::HostBackend as B;
 use softrast_softness::Family;
 use softrast_tensor::vector;
 
-/// Rates of the Adam that moves φ.
+/// Learning rates of Adam for φ.
 const RATES: [f64; 4] = [0.001, 0.01, 0.03, 0.1];
-/// Training seeds that rates are chosen on, at most.
+/// Largest number of training seeds for choosing a rate.
 const TRAINING: u64 = 6;
 
 fn main() -> anyhow::Result<()> {
@@ -41,14 +41,14 @@ fn main() -> anyhow::Result<()> {
     study.page("learning.md", &format!("On {}.\n{}", machine(), table.markdown()))
 }
 
-/// Adds the rows of a task: for each softness that adapts, both variants.
+/// Adds a task's rows: both variants of each adapting softness.
 fn rows<T: Task>(table: &mut Table, seeds: u64, study: &Study) -> anyhow::Result<()> {
     let seeds = if study.quick { 2 } else { seeds };
     let of = |variant, method: &MethodArgs| -> anyhow::Result<Instances<T, B>> {
         let (size, steps) = (study.quick.then_some(32), study.quick.then_some(10));
         let common = Common { variant, size, steps, ..Common::default() };
         let (task, method, solve) = setup::<T>(&usual_args(), &common, method)?;
-        // Nothing is learned: of the estimators it is the one that a hard image and a surrogate go with.
+        // Nothing is learned; this estimator alone supports a hard image and a surrogate.
         let estimator = Some(MetaGradient::EvolutionStrategy { sigma: SIGMA, pairs: 1 });
         let outer_loss = Some(OuterLoss::Hard);
         let config = LearnConfig { estimator, outer_loss, ..LearnConfig::default() };
@@ -92,13 +92,13 @@ fn rows<T: Task>(table: &mut Table, seeds: u64, study: &Study) -> anyhow::Result
     Ok(())
 }
 
-/// Hard errors where runs end whose softness stays, by seed.
+/// Hard errors at the last step with fixed φ, one per seed.
 fn stays<T: Task>(instances: &Instances<T, B>, seeds: u64) -> Vec<f64> {
     let phi = vector::<B>(&instances.start());
     (0..seeds).map(|seed| instances.loss(seed, &phi)).collect()
 }
 
-/// The same where it goes down the inner loss at this rate.
+/// Hard errors at the last step with φ descending the inner loss at `learning_rate`, one per seed.
 fn adapts<T: Task>(
     instances: &Instances<T, B>,
     seeds: impl Iterator<Item = u64>,
@@ -113,7 +113,7 @@ fn short(x: f64) -> String {
     if x.abs() < 0.01 { format!("{x:.5}") } else { format!("{x:.3}") }
 }
 
-/// The mean difference, seed by seed, and its interval: in bold where that leaves out 0.
+/// Mean paired difference and its interval; bold if the interval excludes 0.
 fn less(a: &[f64], b: &[f64]) -> String {
     let (mean, [low, high]) = paired(a, b);
     let text = format!("{} ({} to {})", short(mean), short(low), short(high));

@@ -1,13 +1,13 @@
-//! How well each estimator of `learn` estimates the slope of the outer loss, and what it costs.
+//! Accuracy and cost of each estimator of `learn` for the slope of the outer loss.
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example estimators              # 16 scenes; 10, 30 and 100 steps
 //! cargo run --release -p compare --features studies --example estimators -- --quick   # 2 scenes; 10 steps, to out/estimators.md
 //! ```
 //!
-//! Small instances of 2D SHAPE and POSE under a static logistic, so that φ is one number, the logarithm of its scale. The truth is the
-//! slope of the outer loss, averaged over the scenes, by central differences of a tenth of a decade on either side; all estimators see
-//! the same scenes. Writes `docs/studies/estimators.md`.
+//! The instances are small scenes of 2D SHAPE and POSE under a logistic of fixed width, for which φ is one number, the logarithm of its
+//! scale. The reference is the slope of the outer loss, averaged over the scenes, by central differences of a tenth of a decade to either
+//! side. All estimators use the same scenes. Writes `docs/studies/estimators.md`.
 
 mod common;
 
@@ -25,13 +25,13 @@ use softrast_raster::HostBackend as B;
 use softrast_softness::Family;
 use softrast_tensor::{numbers, vector};
 
-/// Half the distance of the differences, in the natural logarithm: a tenth of a decade.
+/// Half-width of the central differences, in natural logarithm: a tenth of a decade.
 const HALF: f64 = 0.1 * std::f64::consts::LN_10;
-/// Scales in NDC, where a pixel is 0.0625. POSE takes no wider ones: every one of its 2,856 faces would reach every pixel.
+/// Scales in NDC (a pixel is 0.0625). POSE has no wider ones, because each of its 2,856 faces would reach every pixel.
 const SHAPE2D_SCALES: [f64; 5] = [0.005, 0.015, 0.04, 0.1, 0.25];
 const POSE_SCALES: [f64; 4] = [0.002, 0.005, 0.015, 0.04];
 
-/// Name, estimator, and the outer loss, which is the inner one where the estimator sees no other.
+/// Name, estimator and outer loss, which is the inner loss where the estimator supports no other.
 const ESTIMATORS: [(&str, MetaGradient, OuterLoss); 5] = [
     ("unrolled, no clip", MetaGradient::Unrolled { clip: None }, OuterLoss::Fixed),
     ("unrolled, adjoint clip", MetaGradient::Unrolled { clip: Some(1.0) }, OuterLoss::Fixed),
@@ -40,11 +40,11 @@ const ESTIMATORS: [(&str, MetaGradient, OuterLoss); 5] = [
     ("es:0.05", MetaGradient::EvolutionStrategy { sigma: 0.05, pairs: 1 }, OuterLoss::Fixed),
 ];
 
-/// What was found at one number of steps and one scale.
+/// Measurements at one number of steps and one scale.
 struct Setting {
-    /// Over the scenes.
+    /// Slope over the scenes.
     slope: Mean,
-    /// For each estimator its gradient over the scenes, and its time in inner loops.
+    /// Gradient over the scenes and time in inner loops, per estimator.
     estimates: Vec<(Mean, f64)>,
 }
 
@@ -110,8 +110,7 @@ fn section<T: Task>(
     Ok(text + "\n")
 }
 
-/// For each estimator and number of steps: at how many scales the sign of the mean is right, how far the mean is above its error, and
-/// the cost.
+/// Number of scales with the correct sign of the mean, mean over its error, and cost, per estimator and number of steps.
 fn table(steps: &[usize], all: &[Vec<Setting>]) -> Table {
     let columns = ["sign", "mean / error", "loops"];
     let columns =
@@ -141,7 +140,7 @@ impl Setting {
         let seeds = first..first + scenes;
         let phi = |shift: f64| vector::<B>(&fixed.start()).add_scalar(shift);
         let mut seconds = 0.0;
-        // One side after the other, so that supports and knots are chosen once for each.
+        // One side after the other, so that supports and knots are chosen once per side.
         let [low, high] = [-HALF, HALF].map(|shift| -> Vec<f64> {
             let phi = phi(shift);
             let loss = |seed| timed(&mut seconds, || fixed.loss(seed, &phi));
@@ -163,7 +162,7 @@ impl Setting {
     }
 }
 
-/// What `work` returns; its time is added to `seconds`.
+/// Returns the result of `work` and adds its time to `seconds`.
 fn timed<R>(seconds: &mut f64, work: impl FnOnce() -> R) -> R {
     let clock = Instant::now();
     let result = work();
@@ -172,7 +171,7 @@ fn timed<R>(seconds: &mut f64, work: impl FnOnce() -> R) -> R {
 }
 
 impl Mean {
-    /// Of the finite ones, as a learner leaves out the others.
+    /// The mean of the finite values; a learner omits the others too.
     fn of(values: impl Iterator<Item = f64>) -> Self {
         let values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
         let (n, mean) = (values.len() as f64, mean(&values));
@@ -180,7 +179,7 @@ impl Mean {
         Self { mean, error: (squares / (n - 1.0) / n).sqrt() }
     }
 
-    /// |mean| over its standard error; 0 where nothing was finite or nothing depends on φ.
+    /// |mean| over its standard error; 0 if no value is finite or nothing depends on φ.
     fn over_error(&self) -> f64 {
         let ratio = self.mean.abs() / self.error;
         if ratio.is_finite() { ratio } else { 0.0 }

@@ -1,8 +1,8 @@
-//! A run of POSE that is stuck under the best decay, and the same pair with feedback; and what both reach by a time.
+//! A POSE run that stalls under the best decay, the same pair with feedback, and the error of each method over time.
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example feedback              # 100 pairs
-//! cargo run --release -p compare --features studies --example feedback -- --quick   # 4 small ones, to out/
+//! cargo run --release -p compare --features studies --example feedback -- --quick   # 4 small pairs, to out/
 //! ```
 //!
 //! Writes `docs/studies/feedback-*.svg` and their points as CSV.
@@ -23,9 +23,9 @@ use softrast_lab::{
 };
 use softrast_raster::HostBackend as B;
 
-/// A run failed if it returns more than this, and found its pose if it returns less than a third of it.
+/// A run fails if it returns a larger error, and finds its pose if it returns less than a third of this.
 const FAILED: f64 = 0.05;
-/// Times of the chart over seconds.
+/// Number of times in the chart over seconds.
 const TIMES: usize = 60;
 
 /// A method and its runs.
@@ -34,7 +34,7 @@ struct Method {
     runs: Vec<Vec<Seen>>,
 }
 
-/// What a run shows at a step.
+/// State of a run at a step.
 #[derive(Clone, Copy)]
 struct Seen {
     scale: f64,
@@ -127,12 +127,12 @@ fn runs(study: &Study, method: &str, pairs: usize) -> anyhow::Result<Vec<Vec<See
     (0..pairs as u64).map(run).collect()
 }
 
-/// The hard error that a run returns.
+/// Hard error of the returned step.
 fn least(run: &[Seen]) -> f64 {
     least_by(run, f64::INFINITY)
 }
 
-/// The least hard error by a time.
+/// Lowest hard error up to `time`, in seconds.
 fn least_by(run: &[Seen], time: f64) -> f64 {
     let seen = run.iter().take_while(|seen| seen.seconds <= time);
     seen.map(|seen| seen.hard_loss).fold(f64::INFINITY, f64::min)

@@ -1,12 +1,12 @@
 //! Peak memory of a meta-gradient through 3D SHAPE, and how it grows.
 //!
 //! ```text
-//! cargo run --release -p compare --features studies --example memory              # 10, 30 and 100 steps, and what grows
+//! cargo run --release -p compare --features studies --example memory              # 10, 30 and 100 steps, other spheres and sizes
 //! cargo run --release -p compare --features studies --example memory -- --quick   # 10 steps, to out/memory.md
 //! ```
 //!
-//! 24 views of a sphere of 1,280 faces on 64 × 64 pixels, exact with the adjoint clipped, as `learn` takes it and in f64 with an error
-//! of 1e-5 a pixel; every measurement in a process of its own. Fails above 1 GiB. Writes `docs/studies/estimators.md`.
+//! Measures the exact meta-gradient with clipped adjoint, as `learn` uses it, for 24 views of a sphere of 1,280 faces on 64 × 64 pixels,
+//! and in f64 with an error of 1e-5 per pixel, each setting in a separate process. Fails above 1 GiB. Writes `docs/studies/estimators.md`.
 
 mod common;
 
@@ -28,7 +28,7 @@ use softrast_raster::RasterBackend;
 use softrast_softness::Family;
 use softrast_tensor::{NdArray, vector};
 
-/// What the peak has to stay below, in MiB.
+/// Limit of the peak memory, in MiB.
 const LIMIT: f64 = 1024.0;
 
 #[derive(Parser)]
@@ -40,10 +40,10 @@ struct Flags {
     only: Option<usize>,
 }
 
-/// What is measured at once.
+/// The configuration of one measurement.
 #[derive(Clone, Copy, Debug)]
 struct Setting {
-    /// Of a float: 32 or 64.
+    /// Bits of a float: 32 or 64.
     bits: usize,
     tolerance: f64,
     /// Subdivisions of the sphere that is deformed.
@@ -54,7 +54,7 @@ struct Setting {
 
 const USUAL: Setting = Setting { bits: 32, tolerance: 1e-5, sphere: 3, size: 64, steps: 10 };
 
-/// The usual sphere and size with other tolerances, floats and steps, then one step away from them with few steps.
+/// The usual sphere and size with several tolerances, float types and steps, then neighbouring spheres and sizes with few steps.
 fn settings(quick: bool) -> Vec<Setting> {
     let steps: &[usize] = if quick { &[10] } else { &[10, 30, 100] };
     let exact = Setting { bits: 64, ..USUAL };
@@ -103,7 +103,7 @@ fn main() -> anyhow::Result<()> {
     study.page("estimators.md", &format!("On {}.\n{}", machine(), table.markdown()))
 }
 
-/// What [`measure`] prints of a setting in a process of its own, because a peak never falls.
+/// Runs [`measure`] in a separate process, because a peak never falls, and returns the numbers that it prints.
 fn in_a_process(k: usize, quick: bool) -> anyhow::Result<[f64; 4]> {
     let mut command = Command::new(env::current_exe()?);
     command.args(["--only", &k.to_string()]).args(quick.then_some("--quick"));
@@ -115,8 +115,8 @@ fn in_a_process(k: usize, quick: bool) -> anyhow::Result<[f64; 4]> {
     Ok(numbers)
 }
 
-/// Takes a gradient and prints the numbers kept from the inner loop for the way back, the peak memory in MiB once the instance was made
-/// and at the end, and the seconds.
+/// Computes a gradient and prints the count of numbers stored by the inner loop for the backward pass, the peak memory in MiB after
+/// creating the instance and at the end, and the seconds.
 fn measure<B: RasterBackend>(setting: Setting) -> anyhow::Result<()> {
     let Setting { tolerance, sphere, size, steps, .. } = setting;
     let args = Args { detail: Some(sphere as usize), ..Args::default() };

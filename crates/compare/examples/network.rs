@@ -1,5 +1,5 @@
-//! What the network has that a curve of one parameter has not: the shapes that come along, in how many ways they can move, and what the
-//! loss does when they do.
+//! Compares the bundled networks with curves of one parameter: their shapes, the directions in which they can move, and the effect of such
+//! moves on the loss.
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example network              # about 10 minutes
@@ -26,22 +26,22 @@ use softrast_raster::HostBackend as B;
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{numbers, tensor_on, vector};
 
-/// The networks that come along, by their names and tasks.
+/// Names of the bundled networks, one per task.
 const NETWORKS: [&str; 4] = ["shape2d-mlp", "shape3d-mlp", "pose-mlp", "occlusion-mlp"];
 /// Curves that a network is compared with.
 const CURVES: [Family; 2] = [Family::Gauss, Family::Logistic];
-/// Signed distances at which functions are compared, in widths of the function: so many to either side of 0, up to so far.
+/// Number of signed distances to either side of 0 at which functions are compared, and the largest, in widths of the function.
 const POINTS: usize = 200;
 const REACH: f64 = 8.0;
-/// Change of a weight for its slope, and directions that are looked at.
+/// Change of a weight for its slope, and number of directions considered.
 const STEP: f64 = 1e-4;
 const MOST: usize = 12;
 /// Largest changes of coverage along each direction.
 const CHANGES: [f64; 9] = [-0.2, -0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1, 0.2];
-/// Directions of the weights in which the function moves most, beside its width, and random ones.
+/// Number of weight directions in which the function moves most, in addition to its width, and of random ones.
 const LEADING: usize = 3;
 const RANDOM: usize = 2;
-/// What colours lines.
+/// Colours of the lines.
 const COLOURS: [[u8; 3]; 6] =
     [[20, 20, 20], [0, 114, 178], [86, 180, 233], [0, 158, 115], [213, 94, 0], [230, 159, 0]];
 
@@ -53,7 +53,7 @@ fn main() -> anyhow::Result<()> {
     study.page("network.md", &page)
 }
 
-/// A network; its functions are compared by the distance over its own width.
+/// A network; its functions are compared over the distance in units of its width.
 struct Network {
     softness: EdgeSoftness,
     phi: Vec<f64>,
@@ -70,7 +70,7 @@ impl Network {
         values(self.softness, &self.softness.with_scale_values(phi, 1.0 / self.width))
     }
 
-    /// How its function changes with each of the weights: a row for each point.
+    /// Derivatives of the function with respect to the weights, one row per point.
     fn slopes(&self) -> Vec<Vec<f64>> {
         let moved = |k: usize, by: f64| {
             let mut phi = self.phi.clone();
@@ -99,7 +99,7 @@ fn covered(softness: EdgeSoftness, phi: &[f64], points: Vec<f64>) -> Vec<f64> {
     numbers(softness.value(vector::<B>(phi), x))
 }
 
-/// Half of the distance from a coverage of a quarter to one of three quarters.
+/// Half the distance between coverages of a quarter and three quarters.
 fn half_width(softness: EdgeSoftness, phi: &[f64]) -> f64 {
     let at = |wanted: f64| {
         let (mut low, mut high) = (-20.0, 20.0);
@@ -118,7 +118,7 @@ fn difference(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// How far the curve of a family is from a function at best, over its scale.
+/// Smallest distance of a family's curve to a function, over all scales.
 fn distance(family: Family, function: &[f64]) -> f64 {
     let softness = EdgeSoftness::new(family);
     let at = |log: f64| difference(&values(softness, &softness.default_phi(log.exp())), function);
@@ -130,8 +130,8 @@ fn distance(family: Family, function: &[f64]) -> f64 {
     at(0.5 * (low + high))
 }
 
-/// Directions of the weights in which the function moves most, each at right angles to those before, and how much it moves along each: by the
-/// power method on the product of the slopes with themselves.
+/// Orthogonal weight directions in which the function moves most, and the movement along each, by the power method on the Gram matrix of
+/// the slopes.
 fn directions(slopes: &[Vec<f64>], count: usize) -> Vec<(Vec<f64>, f64)> {
     let weights = slopes[0].len();
     let mut found: Vec<(Vec<f64>, f64)> = Vec::new();
@@ -166,7 +166,7 @@ fn unit(direction: &mut [f64]) {
     direction.iter_mut().for_each(|x| *x /= length);
 }
 
-/// What the networks look like.
+/// Table of the networks' shapes.
 fn shapes() -> anyhow::Result<Table> {
     let mut table = Table::new([
         "network",
@@ -196,8 +196,8 @@ fn shapes() -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// What a run of 2D SHAPE returns when its network is moved, on small instances: where coverage far from a face does not vanish, every
-/// pixel sees every face.
+/// Returned errors of 2D SHAPE with a moved network. The instances are small, because coverage that does not vanish far from a face pairs
+/// every pixel with every face.
 fn landscape(study: &Study) -> anyhow::Result<String> {
     let (runs, size, triangles, steps) =
         if study.quick { (2, 16, 24, 20) } else { (40, 64, 100, 100) };
@@ -301,7 +301,7 @@ fn landscape(study: &Study) -> anyhow::Result<String> {
     ))
 }
 
-/// A mean difference as a part of what it is a difference to, in bold where its interval leaves out 0.
+/// Mean difference in percent of `of`, in bold if its interval excludes 0.
 fn told(less: &[f64], of: f64) -> String {
     let [low, high] = mean_interval(less);
     let text = format!("{:+.0} %", 100.0 * mean(less) / of);

@@ -1,13 +1,13 @@
-//! Every estimator of `learn` from the same wrong start at the same budget of inner loops, with a grid search and a line search beside
-//! them.
+//! Compares the estimators of `learn`, all from the same wrong start, with a grid search and a line search at the same budget of inner
+//! loops.
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example orders              # 400 inner loops each
 //! cargo run --release -p compare --features studies --example orders -- --quick   # 40 on tiny instances, to out/orders.md
 //! ```
 //!
-//! Small instances of 2D SHAPE, once with the scale of a logistic to learn and once with the weights of the network that is fitted to
-//! it. Writes `docs/studies/orders-*.svg`, their points as CSV and `docs/studies/estimators.md`.
+//! Learns the scale of a logistic, and the weights of a network fitted to it, on small instances of 2D SHAPE. Writes
+//! `docs/studies/orders-*.svg`, their points as CSV and `docs/studies/estimators.md`.
 
 mod common;
 
@@ -28,12 +28,12 @@ use softrast_raster::HostBackend as B;
 use softrast_softness::{Family, Softness};
 use softrast_tensor::vector;
 
-/// Four times as wide as is best.
+/// Initial scale, four times the best.
 const START: f64 = 0.03;
-/// Instances of an update, and of a validation.
+/// Instances per update, and per validation.
 const BATCH: usize = 8;
 const VALIDATION: usize = 16;
-/// Scales of the grid: the first, each over the one before, and how many at most.
+/// Grid of scales: the first, the ratio of successive ones, and the largest number of them.
 const GRID: (f64, f64, usize) = (0.002, 1.5, 12);
 
 /// The size of the study.
@@ -44,14 +44,14 @@ struct Work {
     common: Common,
 }
 
-/// What is learned.
+/// A method to learn.
 struct Subject {
     method: MethodArgs,
     /// Learning rate of the updates.
     rate: f64,
 }
 
-/// Name, estimator, and the inner loops that an instance costs, roughly.
+/// Name, estimator and approximate cost of an instance in inner loops.
 fn estimators(rate: f64) -> [(&'static str, MetaGradient, f64); 5] {
     let es = MetaGradient::EvolutionStrategy { sigma: 0.2, pairs: 1 };
     [
@@ -93,7 +93,7 @@ impl Subject {
         MethodArgs { scale: Some(scale), ..self.method.clone() }
     }
 
-    /// By each estimator: the lowest validation loss so far over seconds.
+    /// Lowest validation loss so far over seconds, per estimator.
     fn learned(&self, work: &Work) -> anyhow::Result<Vec<Series>> {
         let learned = |(name, estimator, loops): (&str, _, f64)| {
             let (task, method, solve) =
@@ -117,7 +117,7 @@ impl Subject {
         estimators(self.rate).into_iter().map(learned).collect()
     }
 
-    /// The same by a grid search and a line search of the scale.
+    /// Lowest validation loss so far over seconds, for a grid search and a line search of the scale.
     fn searched(&self, work: &Work) -> anyhow::Result<Vec<Series>> {
         let (task, method, solve) = setup::<Shape2d>(&work.args, &work.common, &self.at(START))?;
         let config = LearnConfig { outer_loss: Some(OuterLoss::Fixed), ..LearnConfig::default() };
@@ -151,7 +151,7 @@ fn grid_search(tried: &mut dyn FnMut(f64) -> f64, trials: usize) {
     }
 }
 
-/// From the start towards the better side in steps that double, then back in halves, on the logarithm.
+/// Searches the logarithm of the scale from the start towards the better side: steps double first, then halve and turn back.
 fn line_search(tried: &mut dyn FnMut(f64) -> f64, trials: usize) {
     let (mut best, mut scale) = (tried(START), START.ln());
     let (mut step, mut widening) = (-0.2_f64, true);
@@ -161,7 +161,7 @@ fn line_search(tried: &mut dyn FnMut(f64) -> f64, trials: usize) {
             (best, scale) = (loss, scale + step);
             step *= if widening { 2.0 } else { 0.5 };
         } else {
-            // The first try may only have gone to the wrong side.
+            // The first trial may have gone to the wrong side.
             widening &= k == 1;
             step *= if widening { -1.0 } else { -0.5 };
         }
@@ -171,7 +171,7 @@ fn line_search(tried: &mut dyn FnMut(f64) -> f64, trials: usize) {
     }
 }
 
-/// The least loss up to every point.
+/// Replaces each loss by the lowest so far.
 fn lowest(name: &str, mut points: Vec<[f64; 2]>) -> Series {
     for k in 1..points.len() {
         points[k][1] = points[k][1].min(points[k - 1][1]);
@@ -180,14 +180,14 @@ fn lowest(name: &str, mut points: Vec<[f64; 2]>) -> Series {
     Series { name: name.to_owned(), points, ..Series::default() }
 }
 
-/// What was found holds until something better is.
+/// Turns points into stairs: a loss holds until a lower one is found.
 fn stairs(mut series: Series) -> Series {
     let steps = series.points.windows(2).flat_map(|pair| [[pair[1][0], pair[0][1]], pair[1]]);
     series.points = series.points.first().copied().into_iter().chain(steps).collect();
     series
 }
 
-/// Who is within a tenth of the best when.
+/// Time until each method is within a tenth of the best loss.
 fn table(subject: &str, all: &[Series]) -> Table {
     let end = |series: &Series| series.points.last().copied().unwrap_or([0.0, f64::INFINITY]);
     let best = all.iter().map(|series| end(series)[1]).fold(f64::INFINITY, f64::min);

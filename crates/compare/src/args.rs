@@ -13,18 +13,18 @@ use crate::{
     tasks::{AnyTask, TASKS, task},
 };
 
-/// Softness families whose settings are searched for, static and decaying, and the MLP. Its random start reaches the whole image, which
-/// takes over twenty times as long as a logistic; the fitted one does not.
+/// Default methods: bundled softnesses, families with searched settings at fixed and decaying width, and the fitted MLP. A random MLP
+/// reaches the whole image and takes over twenty times as long as a logistic.
 const METHODS: &str = "preset,learned,searched,learned-mlp,learned-surrogate,logistic --schedule static,gauss --schedule static,exp --schedule static,\
                        gamma --schedule static,mlp --init fitted --schedule static,logistic --schedule decay,gauss --schedule decay,\
                        exp --schedule decay,gamma --schedule decay";
 
-/// What is varied unless said otherwise: the default of the tasks and the simplest method.
+/// Methods varied by default: the default of the tasks and the simplest method.
 const VARIED: &str = "preset,logistic --schedule static";
 
 /// Evaluates all methods on all tasks, original and transfer, and writes the tables.
 ///
-/// After a kill the same command goes on from what is finished.
+/// After an interruption the same command resumes from the finished runs.
 #[derive(Clone, Debug, Parser)]
 #[command(version)]
 pub struct Args {
@@ -32,20 +32,20 @@ pub struct Args {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "all")]
     pub tasks: Vec<String>,
 
-    /// Methods: softness families or files, preset, or learned for what was learned on the task; behind one may stand flags of its own
+    /// Methods: softness families or files, preset, or learned for the softness learned on the task; each may be followed by its own flags
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS, value_parser = named)]
     pub methods: Vec<NamedMethod>,
 
-    /// Methods that the charts of error against seconds also show with half the pixels a side, with pixels that may be off by more or
-    /// less, and on every other backend that the program was built with; "" for none
+    /// Methods that the charts of error over seconds also show at half the resolution, with another pixel tolerance, and on every other
+    /// backend that the program was built with; "" for none
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED, value_parser = named)]
     pub varied: Vec<NamedMethod>,
 
-    /// What comes with the program for a task and is also tried on all others, for Table 6; "" for none
+    /// Bundled softnesses of a task that are also evaluated on all other tasks, for Table 6; "" for none
     #[arg(long, value_name = "learned|learned-mlp,...", value_delimiter = ',', default_value = "learned", value_parser = crossing)]
     pub crossed: Vec<String>,
 
-    /// Seeds of every cell: one number, or one for each of the tasks in their order [default: what the task asks for]
+    /// Seeds per cell: one number, or one per task in their order [default: the task's number]
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub runs: Vec<u32>,
 
@@ -53,7 +53,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "runs")]
     pub quick: bool,
 
-    /// What to compute on: ndarray, flex or wgpu, if the program was built with it
+    /// Backend to compute on: ndarray, flex or wgpu, if the program was built with it
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
 
@@ -65,7 +65,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.md")]
     pub tables: Option<PathBuf>,
 
-    /// Evaluate nothing, but make the tables of these documents again from the records that they keep; an error if one was different
+    /// Only rebuild the tables of these documents from their stored records; an error if one differed
     #[arg(long, value_name = "FILE.md,...", value_delimiter = ',', conflicts_with = "tables")]
     pub recompute: Vec<PathBuf>,
 
@@ -83,7 +83,7 @@ pub struct Args {
     pub quiet: bool,
 }
 
-/// A method and what it is called; none for the empty text.
+/// A method with its name; no method for the empty text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedMethod {
     name: String,
@@ -101,7 +101,7 @@ fn named(text: &str) -> Result<NamedMethod, String> {
         }
         choice => choice.as_ref().map(ToString::to_string).unwrap_or_default(),
     };
-    // The flags without what every flag has.
+    // The flags without `--`, and without `--schedule`.
     let flags = text.split_whitespace().skip(1).filter(|word| *word != "--schedule");
     let words = flags.map(|word| word.trim_start_matches("--").to_owned());
     let name = [softness].into_iter().chain(words).collect::<Vec<_>>().join(" ");
@@ -118,7 +118,7 @@ fn crossing(text: &str) -> Result<String, String> {
     }
 }
 
-/// Whether a method that comes with the programs does so for a task; one that is added may have none.
+/// Whether the bundled softness of a method exists for a task; a new task may have none.
 fn is_there(task: &'static dyn AnyTask, method: &MethodArgs) -> bool {
     let there = |name: &str| ScheduledSoftness::learned(name).is_ok();
     match &method.softness {
@@ -131,11 +131,11 @@ fn is_there(task: &'static dyn AnyTask, method: &MethodArgs) -> bool {
 }
 
 impl Args {
-    /// All cells in the order of the tables: by task, variant and method, and at the end what is tried on other tasks.
+    /// All cells in the order of the tables: by task, variant and method, then the methods crossed between tasks.
     ///
     /// # Errors
     ///
-    /// If there is no task of that name, or the numbers of seeds are neither one nor one for each task.
+    /// If a task does not exist, or the numbers of seeds are neither one nor one per task.
     pub fn cells(&self) -> anyhow::Result<Vec<Cell>> {
         let mut tasks: Vec<&'static dyn AnyTask> = Vec::new();
         for name in &self.tasks {
@@ -174,9 +174,9 @@ impl Args {
         Ok(cells)
     }
 
-    /// Methods as they are, and varied.
+    /// Adds the cells of the methods as given, and varied.
     ///
-    /// What was learned or searched for on a task is left out where it is the preset, if that is compared.
+    /// A learned or searched softness is omitted where it is the preset, if the preset is compared.
     fn compared(
         &self,
         task: &'static dyn AnyTask,
@@ -228,7 +228,7 @@ impl Args {
                     MethodArgs { resolution: Some(Resolution::Side(side)), ..method.clone() };
                 let purpose = Purpose::Varied(Variation::Resolution);
                 cells.push(cell(varied(format!("resolution {side}")), fewer, None, purpose));
-                // What is usual where the scale moves, where it stays, and the other way round.
+                // The usual tolerance of a moving width where this one is fixed, and vice versa.
                 let other = Method::usual_tolerance(usual.method.softness.is_constant());
                 let less = MethodArgs { tolerance: Some(other), ..method.clone() };
                 let purpose = Purpose::Varied(Variation::Tolerance);
@@ -243,7 +243,7 @@ impl Args {
         Ok(())
     }
 
-    /// What was learned on one task, on another or, unless it is compared anyway, on itself.
+    /// The cell of the softness learned on `from`, on `task`; none if that is compared anyway or not bundled.
     fn crossed_cell(
         &self,
         task: &'static dyn AnyTask,
@@ -272,7 +272,7 @@ impl Args {
         self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual)
     }
 
-    /// Backends that the program was built with and the system has, beside the one that is computed on.
+    /// Backends that the program was built with and the system supports, except the one in use.
     fn other_backends(&self) -> Vec<&'static str> {
         let all = compiled_backends!();
         let first = all.first().map(|backend| backend.name());
@@ -294,8 +294,8 @@ mod tests {
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick --tasks shape2d,shape3d,pose,occlusion").cells().unwrap();
-        // Beside eleven of all tasks a surrogate and four that are varied where edges move, and on three tasks what was learned beside the
-        // preset, on one what was searched for.
+        // Eleven on every task; where edges move, a surrogate and four variations; on three tasks the learned softness, on one the searched
+        // one; then the crossed ones.
         assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + (3 + 1) * 2 + 4 * 2 * 3);
         assert_eq!((cells[0].task.name(), cells[18].variant), ("shape2d", Variant::Transfer));
         assert_eq!((&*cells[0].name, &*cells[12].name), ("preset", "preset resolution 128"));
@@ -327,7 +327,7 @@ mod tests {
         assert_eq!(two.len(), 2 * 2 + 2 * 2 * 2);
     }
 
-    /// A task for which nothing comes with the programs.
+    /// A task without a bundled softness.
     struct Disc;
 
     impl AnyTask for Disc {

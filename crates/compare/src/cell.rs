@@ -11,56 +11,56 @@ pub struct Cell {
     pub variant: Variant,
     /// The method.
     pub method: MethodArgs,
-    /// What the method is called.
+    /// Name of the method.
     pub name: String,
-    /// Another backend than the one of all cells.
+    /// Backend of this cell, if it differs from that of all cells.
     pub backend: Option<&'static str>,
     /// Seeds, from 0 on.
     pub runs: u32,
-    /// What it is for.
+    /// Purpose of the cell.
     pub purpose: Purpose,
 }
 
-/// Where a cell is shown.
+/// Tables and charts that show a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// In all tables and charts but Table 6.
+    /// All tables and charts except Table 6.
     Compared,
-    /// As one that only varies another: a mark on the charts of error against seconds, but no curve.
+    /// A variation of another cell: a mark in the charts of error over seconds, but no curve.
     Varied(Variation),
-    /// In Table 6 alone: what was learned on the task of this name.
+    /// Table 6 only: the softness learned on the task of this name.
     Crossed(&'static str),
 }
 
-/// What a method is varied in.
+/// The property in which a method is varied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variation {
     /// Half the pixels a side.
     Resolution,
-    /// A larger or smaller error of a pixel.
+    /// A larger or smaller tolerance of a pixel.
     Tolerance,
     /// Another backend.
     Backend,
 }
 
 impl Cell {
-    /// What is run, on the `backend` that all cells are computed on.
+    /// The experiment of the cell, on `backend` unless the cell has another.
     ///
     /// # Errors
     ///
-    /// Those of the task.
+    /// Any error of the task.
     pub fn entry(&self, backend: Option<&str>) -> anyhow::Result<Entry> {
         let backend = self.backend.or(backend).map(str::to_owned);
         let common = Common { variant: self.variant, backend, ..Common::default() };
         self.task.entry(&common, &self.method)
     }
 
-    /// Its seeds.
+    /// Seeds of the cell, from 0 on.
     pub fn seeds(&self) -> Vec<u64> {
         softrast_lab::seeds(0, self.runs as usize)
     }
 
-    /// Whether it is what the task's program does without flags.
+    /// Whether the cell is the default of the task's program, without flags.
     pub fn is_default(&self) -> bool {
         self.method
             == MethodArgs { softness: Some(SoftnessChoice::Preset), ..MethodArgs::default() }

@@ -1,4 +1,4 @@
-//! Charts of speed against accuracy, for one task in one variant or over all of them.
+//! Charts of speed against accuracy, per task and variant and over all of them.
 
 use softrast_cli::{Variant, method_colour};
 use softrast_lab::{
@@ -12,15 +12,15 @@ use softrast_tensor::{numbers, tensor, vector};
 
 use crate::{Measured, Purpose, Variation, groups::grouped, measured::short};
 
-/// A run is solved where its hard error has fallen to this share of what it began with. Fixed before anything was measured.
+/// A run is solved once its hard error has fallen to this share of its initial value. Chosen before any measurement.
 const TARGET: f64 = 0.1;
-/// Seconds of one cell in two comparisons differ by such a share and more.
+/// Relative difference of a cell's seconds between two comparisons; it may be larger.
 const SCATTER: f64 = 0.1;
-/// Farthest distance from the edge at which soft steps are shown, in pixels, and points on either side.
+/// Largest distance from the edge in the charts of soft steps, in pixels, and number of points on either side.
 const REACH_PX: f64 = 1.0;
 const HALF: i32 = 120;
 
-/// A chart with its file name and what it shows.
+/// A chart with its file name and caption.
 pub(crate) struct Chart {
     pub(crate) name: String,
     pub(crate) caption: String,
@@ -29,9 +29,9 @@ pub(crate) struct Chart {
 
 /// All charts of a comparison.
 pub(crate) struct Charts {
-    /// Of each task in each variant, in the order of [`by_variant`].
+    /// Charts per task and variant, in the order of [`by_variant`].
     pub(crate) of_variants: Vec<Vec<Chart>>,
-    /// Over all of them.
+    /// Performance profile over all tasks and variants.
     pub(crate) profile: Option<Chart>,
 }
 
@@ -46,7 +46,7 @@ impl Charts {
     }
 }
 
-/// The cells of each task in each variant, in the order of the tables, without those of Table 6 alone.
+/// Cells per task and variant, in the order of the tables, without those only in Table 6.
 pub(crate) fn by_variant(measured: &[Measured]) -> Vec<Vec<&Measured>> {
     grouped(measured, |one| {
         let shown = !matches!(one.cell.purpose, Purpose::Crossed(_));
@@ -102,7 +102,7 @@ fn of_variant(all: &[&Measured]) -> Vec<Chart> {
         },
         pareto(all, &stem, &of),
     ];
-    // Edges that stay are so sharp that all of them would be one step.
+    // Edges that do not move are so sharp that all curves would be one step.
     charts.extend(first.cell.task.moves_edges().then(|| functions(&cells, &stem, &of)));
     charts
 }
@@ -127,7 +127,7 @@ fn trace(run: &Run, place: usize, lowest: bool) -> Vec<f64> {
     run.curve.iter().map(value).collect()
 }
 
-/// Median and quartiles over the runs at every point of their curves: over the steps, or the lowest so far over seconds.
+/// Median and quartiles over the runs at every point of their curves: of the metric over the steps, or of its lowest value over seconds.
 fn over(one: &Measured, place: usize, anytime: bool) -> Series {
     let curves: Vec<Vec<f64>> = one.runs.iter().map(|run| trace(run, place, anytime)).collect();
     let whole = if anytime { one.seconds } else { one.entry.solve.steps as f64 };
@@ -140,11 +140,11 @@ fn over(one: &Measured, place: usize, anytime: bool) -> Series {
     series
 }
 
-/// What a method costs and gives.
+/// Cost and errors of a method.
 struct Price {
-    /// Of a run.
+    /// Seconds per run.
     seconds: f64,
-    /// Hard errors of what the runs return, in the order of the seeds.
+    /// Hard errors of the returned steps, in the order of the seeds.
     errors: Vec<f64>,
 }
 
@@ -153,8 +153,8 @@ impl Price {
         [self.seconds, mean(&self.errors)]
     }
 
-    /// Whether it is at least as good as the other and clearly better in one of the two: by [`SCATTER`] of the seconds, or in the error
-    /// beyond the 95 % interval of the differences.
+    /// Whether it is no worse in both and significantly better in one: in seconds by [`SCATTER`], or in the error beyond the 95 % interval
+    /// of the differences.
     fn beats(&self, other: &Self) -> bool {
         let ([seconds, error], [others, others_error]) = (self.point(), other.point());
         let faster = seconds <= (1.0 - SCATTER) * others;
@@ -163,7 +163,7 @@ impl Price {
     }
 }
 
-/// Places of the methods that no other one beats, the fastest first.
+/// Indices of the methods that no other one beats, fastest first.
 fn front(prices: &[Price]) -> Vec<usize> {
     let beaten = |one: &Price| prices.iter().any(|other| other.beats(one));
     let mut front: Vec<usize> = (0..prices.len()).filter(|&k| !beaten(&prices[k])).collect();
@@ -217,7 +217,7 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
     }
 }
 
-/// What beats a method, and by how much.
+/// The methods that beat method `k`, and by how much.
 fn beaten_by(cells: &[&Measured], prices: &[Price], k: usize) -> String {
     let better = cells.iter().zip(prices).filter(|(_, other)| other.beats(&prices[k]));
     let by = better.map(|(one, Price { seconds, errors })| {
@@ -229,7 +229,7 @@ fn beaten_by(cells: &[&Measured], prices: &[Price], k: usize) -> String {
     by.collect::<Vec<_>>().join(", ")
 }
 
-/// Variations are told from the method that they vary.
+/// The mark of a method; it distinguishes variations from the method that they vary.
 fn mark(one: &Measured) -> Mark {
     match one.cell.purpose {
         Purpose::Varied(Variation::Resolution) => Mark::Triangle,
@@ -239,7 +239,7 @@ fn mark(one: &Measured) -> Mark {
     }
 }
 
-/// What each method of one task takes for the step at an edge, at the last step of a run (Fig. 3 of the paper).
+/// The soft step of each method at an edge, at the last step of a run (Fig. 3 of the paper).
 fn functions(cells: &[&Measured], stem: &str, of: &str) -> Chart {
     let series = cells.iter().map(|one| {
         let (method, size) = (&one.entry.method.softness, one.entry.solve.size);
@@ -263,15 +263,15 @@ fn functions(cells: &[&Measured], stem: &str, of: &str) -> Chart {
     }
 }
 
-/// The share of all problems, a problem being a seed of a task in a variant, that a method solves within a factor of the time of the
-/// fastest one on that problem.
+/// Performance profile: the share of problems (task, variant, seed) that a method solves within a factor of the fastest method's time
+/// there.
 fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
     let compared = |group: &'_ [&'_ Measured]| -> Vec<usize> {
         let kept = |k: &usize| group[*k].cell.purpose == Purpose::Compared;
         (0..group.len()).filter(kept).collect()
     };
     let mut methods: Vec<Series> = Vec::new();
-    // Of every method its ratios.
+    // Time ratios per method.
     let mut ratios: Vec<Vec<f64>> = Vec::new();
     let mut problems = 0;
     for group in groups {
@@ -320,12 +320,12 @@ fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
     })
 }
 
-/// Time until a run's hard error has fallen to the target; none if it never does.
+/// Seconds until a run's hard error has fallen to the target; none if it never does.
 fn seconds_to_target(one: &Measured, run: usize) -> Option<f64> {
     let hard = trace(&one.runs[run], one.hard_place(), false);
     let target = TARGET * hard.first()?;
     let step = hard.iter().position(|error| *error <= target)?;
-    // A target that holds from the start takes no time: the least that is told apart.
+    // A target that holds from the start counts as one interval, the shortest resolvable time.
     Some(one.seconds * (step.max(1) as f64 / intervals(one)))
 }
 
@@ -342,7 +342,7 @@ mod tests {
         let clear = [(1.0, 5.0), (2.0, 5.0), (3.0, 1.0), (0.5, 9.0), (3.0, 2.0)];
         let mut prices: Vec<Price> = clear.map(|(seconds, mean)| price(seconds, mean, 0.0)).into();
         assert_eq!(front(&prices), [3, 0, 2]);
-        // A little slower than the first, and worse by less than it scatters.
+        // A little slower than the first, and worse by less than its noise.
         prices.push(price(1.05, 5.1, 1.0));
         assert_eq!(front(&prices), [3, 0, 5, 2]);
     }

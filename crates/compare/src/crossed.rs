@@ -1,4 +1,4 @@
-//! Table 6 of the paper: what was learned on one task, used on another.
+//! Table 6 of the paper: the softness learned on one task, used on another.
 
 use softrast_lab::{mean, report::Table};
 
@@ -7,7 +7,7 @@ use crate::{
     groups::{by_variant, with_interval},
 };
 
-/// What was learned on each task, on all of them; the lowest of a column in bold. None where nothing is crossed.
+/// Errors of the softness learned on each task, on all tasks; the lowest of a column in bold. None if nothing is crossed.
 pub(crate) fn crossed(records: &[Record]) -> Option<Table> {
     let mut rows: Vec<&[String; 2]> = Vec::new();
     for one in records.iter().filter(|one| !one.compared) {

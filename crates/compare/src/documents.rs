@@ -1,7 +1,7 @@
-//! Documents whose tables are made of kept records, and can be made again.
+//! Documents whose tables are generated from stored records.
 //!
-//! A table stands between two comments: `<!-- table NAME -->`, or `<!-- table NAME of FILE -->` with the records' file beside the document, and
-//! `<!-- end of table -->`.
+//! A table lies between two comments: `<!-- table NAME -->`, or `<!-- table NAME of FILE -->` with the records' file relative to the
+//! document, and `<!-- end of table -->`.
 
 use std::{fs, path::Path};
 
@@ -13,7 +13,7 @@ const BEGIN: &str = "<!-- table ";
 const CLOSE: &str = " -->";
 const END: &str = "<!-- end of table -->";
 
-/// A table between its comments; empty where there is nothing to show.
+/// A table between its comments; empty if there is nothing to show.
 ///
 /// # Errors
 ///
@@ -28,8 +28,8 @@ fn block_of(records: &[Record], name: &str, head: &str) -> anyhow::Result<String
     Ok(format!("{BEGIN}{head}{CLOSE}\n{table}{END}\n"))
 }
 
-/// The text of a document with its tables made again of the records that they name; without a name they are those in `cells.jsonl` in the
-/// folder that is called as the document.
+/// The text of a document, and the text with its tables rebuilt from the records that they name, by default `cells.jsonl` in the folder
+/// named after the document.
 ///
 /// # Errors
 ///

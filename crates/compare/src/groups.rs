@@ -1,15 +1,15 @@
-//! Records in groups, and their numbers in few letters.
+//! Records in groups, and their numbers in short form.
 
 use softrast_lab::{mean, mean_interval};
 
 use crate::{Record, TASKS, measured::short};
 
-/// The records of each task in each variant, in the order of the tables, without those of Table 6 alone.
+/// Records per task and variant, in the order of the tables, without those only in Table 6.
 pub(crate) fn by_variant(records: &[Record]) -> Vec<Vec<&Record>> {
     grouped(records, |one| one.compared.then_some((one.task.as_str(), one.original)))
 }
 
-/// What has a task, and whether it is the original, in the order of the tables; what has none is left out.
+/// Groups by task and variant (`true` for the original), in the order of the tables; items without a key are excluded.
 pub(crate) fn grouped<'a, T>(
     all: &'a [T],
     key: impl Fn(&'a T) -> Option<(&'a str, bool)>,
@@ -20,7 +20,7 @@ pub(crate) fn grouped<'a, T>(
     places.map(group).filter(|group| !group.is_empty()).collect()
 }
 
-/// Mean and interval, where there are several runs.
+/// Mean, with its interval if there are several runs.
 pub(crate) fn with_interval(errors: &[f64]) -> String {
     let (mean, [low, high]) = (short(mean(errors)), mean_interval(errors).map(short));
     if errors.len() == 1 { mean } else { format!("{mean} ({low} to {high})") }

@@ -1,7 +1,7 @@
 //! Evaluates all methods on all tasks and writes the tables of the paper with our figures.
 //!
-//! A [`Cell`] is a task in one variant solved with one method. Cells are evaluated one after the other by what the tasks' own programs run,
-//! and every finished run is kept, so the same command goes on after a kill. All methods of a task share its seeds.
+//! A [`Cell`] is a task in one variant solved with one method. Cells are evaluated one after the other by the code of the tasks' programs,
+//! and every finished run is stored, so that the same command resumes after an interruption. All methods of a task share its seeds.
 
 mod args;
 mod cell;

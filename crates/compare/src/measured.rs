@@ -7,15 +7,15 @@ use softrast_lab::{
 
 use crate::Cell;
 
-/// What a cell came to.
+/// Results of a cell.
 pub struct Measured {
     /// The cell.
     pub cell: Cell,
-    /// What was run.
+    /// The evaluated experiment.
     pub entry: Entry,
     /// The runs, in the order of the seeds.
     pub runs: Vec<Run>,
-    /// Of the first.
+    /// Pictures of the first run.
     pub pictures: Option<Encoded>,
     /// Time of the optimisation steps of a run, in seconds.
     pub seconds: f64,
@@ -28,16 +28,16 @@ pub struct MeanError {
     pub mean: f64,
     /// Its 95 % interval.
     pub ci95: [f64; 2],
-    /// In the order of the seeds.
+    /// Error of each run, in the order of the seeds.
     pub per_run: Vec<f64>,
 }
 
 impl Measured {
-    /// Evaluates a cell on the `backend` that all cells are computed on; what is finished is not done again.
+    /// Evaluates a cell, on `backend` unless it has another; finished runs are not repeated.
     ///
     /// # Errors
     ///
-    /// Those of the task.
+    /// Any error of the task.
     pub fn of(cell: &Cell, runner: &mut Runner, backend: Option<&str>) -> anyhow::Result<Self> {
         let (entry, seeds) = (cell.entry(backend)?, cell.seeds());
         runner.progress.expect(entry.solve.steps * seeds.len());
@@ -49,7 +49,7 @@ impl Measured {
         Self::new(cell.clone(), entry, evaluations.remove(0))
     }
 
-    /// Of an evaluated entry.
+    /// The results of an evaluated entry.
     pub(crate) fn new(
         cell: Cell,
         entry: Entry,
@@ -66,12 +66,12 @@ impl Measured {
         })
     }
 
-    /// What is measured at every point.
+    /// Metrics measured at every point.
     pub fn metrics(&self) -> &[Metric] {
         self.entry.experiment.metrics()
     }
 
-    /// Place of the error of the hard image among the metrics, which compares methods of any width.
+    /// Index of the hard image's error among the metrics; it compares methods of any width.
     pub fn hard_place(&self) -> usize {
         place(self.metrics(), Role::Score)
     }
@@ -95,13 +95,13 @@ impl Measured {
         self.error("parameter_error").unwrap_or_else(|| self.hard())
     }
 
-    /// Name and unit of the metric at a place.
+    /// Name and unit of the metric at index `place`.
     pub fn title(&self, place: usize) -> String {
         let Metric { name, unit, .. } = self.metrics()[place];
         if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
     }
 
-    /// Hard errors of the steps that the runs return, in the order of the seeds.
+    /// Hard errors of the returned steps, in the order of the seeds.
     pub fn returned(&self) -> Vec<f64> {
         let hard = self.hard_place();
         let returned = |run: &Run| run.returned(hard).map(|point| point.values[hard]);
@@ -118,7 +118,7 @@ impl Measured {
         !self.entry.method.softness.is_constant()
     }
 
-    /// Scale before the first and at the last step, surrogate and depth scale if there are such, learning rate.
+    /// Scale before the first and at the last step, surrogate and depth scale if present, learning rate.
     pub fn setting(&self) -> String {
         let size = self.entry.solve.size;
         let [first, last] =
@@ -151,13 +151,13 @@ impl Measured {
     }
 }
 
-/// A number of three digits as one would type it.
+/// A number rounded to three digits, as one would type it.
 fn plain(x: f64) -> String {
     let rounded = rounded(x);
     if rounded < 1e-4 { format!("{rounded:e}") } else { rounded.to_string() }
 }
 
-/// A number with three digits that count.
+/// A number with three significant digits.
 pub(crate) fn short(x: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();

@@ -38,11 +38,11 @@ fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> 
     output.print(args.json, &again, stdout)
 }
 
-/// Makes the tables of documents again of the records that they keep.
+/// Rebuilds the tables of documents from their stored records.
 ///
 /// # Errors
 ///
-/// If a document cannot be made again or written, or had another table; it is written then.
+/// If a document cannot be rebuilt or written, or if it had another table; then it is updated nevertheless.
 fn recompute(args: &Args) -> anyhow::Result<Output> {
     let mut others = Vec::new();
     for document in &args.recompute {
@@ -64,8 +64,8 @@ fn recompute(args: &Args) -> anyhow::Result<Output> {
     Ok(Output { json: json!({ "documents": documents }), text, ..Output::default() })
 }
 
-/// Evaluates all cells, writes tables, report and charts after each, and says where. `command` is what they name as what made them, `inputs`
-/// what it reads.
+/// Evaluates all cells, writes tables, report and charts after each, and returns where they are. The files name `command` as their origin;
+/// `inputs` are the files that it reads.
 ///
 /// # Errors
 ///
@@ -90,7 +90,7 @@ pub fn compare(args: &Args, command: &str, inputs: &Inputs) -> anyhow::Result<Ou
         let one = Measured::of(cell, &mut runner, args.backend.as_deref());
         runner.progress = Progress::of_program(args.quiet);
         measured.push(one.with_context(|| format!("{task} {variant} with {}", cell.name))?);
-        // After every cell: whoever stops a long comparison has tables of what is finished.
+        // After every cell, so that an interrupted comparison has tables of the finished cells.
         folders.write(&measured, command)?;
     }
     let [tables, report] = [tables(args), args.out.join(PAGE)].map(|path| shown(&path));
@@ -100,7 +100,7 @@ pub fn compare(args: &Args, command: &str, inputs: &Inputs) -> anyhow::Result<Ou
     Ok(Output { json, text: vec![text], ..Output::default() })
 }
 
-/// Makes the runs that are a shard's; no table is written.
+/// Executes the runs of a shard; no table is written.
 fn part(args: &Args, cells: &[Cell], mut runner: Runner) -> anyhow::Result<Output> {
     let backend = args.backend.as_deref();
     let entries = cells.iter().map(|cell| Ok((cell.entry(backend)?, cell.seeds())));
@@ -133,11 +133,11 @@ fn tables(args: &Args) -> PathBuf {
     args.tables.clone().unwrap_or_else(|| args.out.join("results.md"))
 }
 
-/// The folders of the results: of the page, of the document with the tables, and of the charts beside that.
+/// Output folders of the page, of the document with the tables, and of the charts next to it.
 struct Folders {
-    /// First, so that it is removed first where nothing is written.
+    /// The first field, so that it is removed first if nothing is written.
     charts: OutputFolder,
-    /// Its name, seen from the document.
+    /// Name of the charts' folder, relative to the document.
     shown: String,
     tables: OutputFolder,
     document: String,
@@ -155,7 +155,7 @@ impl Folders {
             let message = format!("--tables {}: expected a name such as a.md", tables.display());
             Error::usage(message)
         })?;
-        // Each has results of its own, also where two are one folder.
+        // Each has separate results, even where two are one folder.
         let open = |path: &Path, command| OutputFolder::open(path, command, inputs);
         let folders = Self {
             out: open(&args.out, "compare")?,
@@ -184,7 +184,7 @@ impl Folders {
         self.out.stage(CELLS, records::csv(&records).as_bytes())?;
         self.out.stage(PAGE, html(measured, &records, &charts, command)?.as_bytes())?;
         self.charts.commit()?;
-        // Documents of other names are those of other comparisons.
+        // Documents with other names belong to other comparisons.
         self.tables.commit_beside(|_| true)?;
         Ok(self.out.commit()?)
     }

@@ -1,4 +1,4 @@
-//! The numbers that tables are made of, a record for every cell: what documents keep, so that their tables can be made again.
+//! The numbers behind the tables, one record per cell. Documents store them, so that their tables can be rebuilt.
 
 use std::fmt::Write;
 
@@ -9,30 +9,30 @@ use softrast_lab::{mean, mean_interval};
 
 use crate::{Cell, Measured, Purpose, TASKS, tasks::AnyTask};
 
-/// Digits of a number that is kept.
+/// Significant digits of a stored number.
 const DIGITS: usize = 5;
 
-/// What a cell came to, as it stands on a line of `cells.jsonl`.
+/// Results of a cell: one line of `cells.jsonl`.
 #[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
     /// Name of the task.
     pub task: String,
-    /// Which variant.
+    /// Whether the variant is the original.
     pub original: bool,
-    /// What the method is called.
+    /// Name of the method.
     pub method: String,
-    /// Its family, where it has one of those of the paper's tables.
+    /// Name of the method's family, for the paper's tables; empty if it is not a named family.
     pub family: String,
-    /// Scales, learning rate and what else was chosen.
+    /// Scales, learning rate and other settings.
     pub setting: String,
     /// Whether the setting was searched for, learned, or named by its flags.
     pub chosen: bool,
-    /// Whether it stands in Table 3, and not in Table 6 alone.
+    /// Whether it is in Table 3, and not only in Table 6.
     pub compared: bool,
-    /// Whether it only varies another.
+    /// Whether it only varies another cell.
     pub varied: bool,
-    /// Kind of what comes along and the task it was learned on, for Table 6.
+    /// Kind of the bundled softness and the task it was learned on, for Table 6.
     pub learned_on: Option<[String; 2]>,
     /// Pixels a side.
     pub size: usize,
@@ -40,24 +40,24 @@ pub struct Record {
     pub steps: usize,
     /// Faces of the scene.
     pub faces: usize,
-    /// Titles of the hard error and of that of the parameters.
+    /// Titles of the hard error and of the parameter error.
     pub titles: [String; 2],
     /// Time of the optimisation steps of a run, in seconds.
     pub seconds: f64,
     /// Image and parameter error in the unit of the paper's Table 3.
     pub in_papers_unit: [Option<f64>; 2],
-    /// Runs that succeed.
+    /// Number of successful runs.
     pub successes: usize,
-    /// Hard error at the last step, in the order of the seeds, which count from 0.
+    /// Hard errors at the last step, in the order of the seeds from 0.
     pub last: Vec<f64>,
-    /// Hard error of the step that is returned.
+    /// Hard errors of the returned steps.
     pub returned: Vec<f64>,
-    /// Error of the parameters at the last step.
+    /// Parameter errors at the last step.
     pub parameter: Vec<f64>,
 }
 
 impl Record {
-    /// Of a cell that is measured.
+    /// The record of a measured cell.
     pub fn of(one: &Measured) -> Self {
         let (cell, metrics) = (&one.cell, one.metrics());
         let family = match &cell.method.softness {
@@ -94,7 +94,7 @@ impl Record {
     ///
     /// # Panics
     ///
-    /// If there is none of its name, which is checked where records are read.
+    /// If no task has this name, which is checked when records are read.
     pub fn task(&self) -> &'static dyn AnyTask {
         let task = TASKS.iter().find(|task| task.name() == self.task);
         *task.unwrap_or_else(|| panic!("there is no task {}", self.task))
@@ -111,7 +111,7 @@ impl Record {
     }
 }
 
-/// The kind of what comes with the programs, and the task that it was learned on.
+/// Kind of the bundled softness, and the task that it was learned on.
 fn learned_on(cell: &Cell) -> Option<[String; 2]> {
     let task = cell.task.name();
     let kind = match &cell.method.softness {
@@ -129,7 +129,7 @@ fn learned_on(cell: &Cell) -> Option<[String; 2]> {
     }
 }
 
-/// To as many digits as are kept.
+/// Rounds to the stored number of digits.
 fn kept(x: f64) -> f64 {
     format!("{x:.*e}", DIGITS - 1).parse().unwrap_or(x)
 }
@@ -156,11 +156,11 @@ pub(crate) fn text(records: &[Record]) -> anyhow::Result<String> {
     lines.collect()
 }
 
-/// The records of a text.
+/// Parses records, one per line.
 ///
 /// # Errors
 ///
-/// If a line is none, or of no task.
+/// If a line is not a record, or its task does not exist.
 pub(crate) fn read(text: &str) -> anyhow::Result<Vec<Record>> {
     let line = |(k, line): (usize, &str)| -> anyhow::Result<Record> {
         let record: Record = serde_json::from_str(line)
@@ -171,7 +171,7 @@ pub(crate) fn read(text: &str) -> anyhow::Result<Vec<Record>> {
     text.lines().enumerate().map(line).collect()
 }
 
-/// One line for every cell, for spreadsheets.
+/// CSV with one line per cell, for spreadsheets.
 pub(crate) fn csv(records: &[Record]) -> String {
     let mut text = String::from(
         "task,variant,method,runs,hard_last,hard_low,hard_high,hard_best_step,parameter_last,success_rate,seconds_a_run\n",

@@ -20,8 +20,8 @@ const READING: &str = include_str!("text/reading.md");
 const SECONDS: &str = include_str!("text/seconds.md");
 const CROSSED: &str = include_str!("text/crossed.md");
 
-/// The tables of the paper with our figures, as Markdown. `command` made them; `pictures` is where the charts are, seen from the file, if
-/// they are to be shown.
+/// The tables of the paper with our figures, as Markdown. The text names `command` as its origin; `pictures` is the charts' folder relative
+/// to the file, if they are to be shown.
 ///
 /// # Errors
 ///
@@ -67,7 +67,7 @@ fn shown(chart: &Chart, pictures: Option<&str>) -> String {
     format!("\n![{0}]({folder}/{0}.svg)\n\n{1}\n", chart.name, chart.caption)
 }
 
-/// The same as one HTML page, with the pictures of the first seed of every cell.
+/// The tables and charts as one HTML page, with the pictures of the first seed of every cell.
 pub(crate) fn html(
     measured: &[Measured],
     records: &[Record],

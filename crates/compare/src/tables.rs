@@ -9,10 +9,10 @@ use crate::{
     measured::short,
 };
 
-/// Hard error of what is returned above which a run has not found its pose.
+/// Returned hard error above which a run has not found its pose.
 const FAILS: f64 = 0.05;
 
-/// Table 2: what each task is.
+/// Table 2: properties of each task.
 pub(crate) fn tasks(records: &[Record]) -> Table {
     let mut table = Table::new([
         "task",
@@ -82,7 +82,7 @@ pub(crate) fn errors(group: &[&Record]) -> Table {
     table
 }
 
-/// Table 5: what a run costs.
+/// Table 5: cost of a run.
 pub(crate) fn seconds(records: &[Record]) -> Table {
     let mut table = Table::new(["task", "variant", "method", "seconds a run", "ms a step"]);
     for one in by_variant(records).into_iter().flatten() {
@@ -97,8 +97,8 @@ pub(crate) fn seconds(records: &[Record]) -> Table {
     table
 }
 
-/// What matters most of Table 3: the preset beside the best searched static softness and the best searched decay, by the hard error that
-/// is returned; in bold where the preset is clearly below both.
+/// Summary of Table 3: the preset next to the best searched fixed width and the best searched decay, by returned hard error; in bold if the
+/// preset is significantly below both.
 pub(crate) fn summary(records: &[Record]) -> Table {
     let mut table = Table::new([
         "task",
@@ -143,7 +143,7 @@ pub(crate) fn summary(records: &[Record]) -> Table {
     table
 }
 
-/// What bounds poses: runs that fail, and how near the others come; for each method of each variant.
+/// Failing runs and the errors of the others, per variant and method.
 fn poses(records: &[Record]) -> Table {
     let mut table = Table::new([
         "variant",
@@ -180,7 +180,7 @@ fn poses(records: &[Record]) -> Table {
     table
 }
 
-/// Mean and interval of the differences on the seeds that both have; in bold where one is clear among so many comparisons.
+/// Mean and interval of the differences on common seeds; in bold if significant among this many `comparisons`.
 fn difference(comparisons: usize, errors: &[f64], reference: &[f64]) -> String {
     let (mean, [low, high]) = paired_among(comparisons, errors, reference);
     if errors.len() == 1 {
@@ -194,7 +194,7 @@ fn pair(errors: [Option<f64>; 2]) -> String {
     errors.into_iter().flatten().map(short).collect::<Vec<_>>().join(" / ")
 }
 
-/// The table of this name: `tasks`, `summary`, `seconds`, `poses`, `crossed`, or `errors TASK VARIANT`; none where there is nothing to show.
+/// The table of this name: `tasks`, `summary`, `seconds`, `poses`, `crossed`, or `errors TASK VARIANT`; none if there is nothing to show.
 ///
 /// # Errors
 ///

@@ -17,7 +17,7 @@ tasks! {
     occlusion::Occlusion,
 }
 
-/// A task, whichever it is.
+/// A task of any type.
 pub trait AnyTask: Sync {
     /// Name of its program.
     fn name(&self) -> &'static str;
@@ -25,13 +25,13 @@ pub trait AnyTask: Sync {
     /// Name in the paper.
     fn title(&self) -> &'static str;
 
-    /// Whether edges move: only then can its images be drawn on fewer pixels and less exactly, and has a surrogate a use.
+    /// Whether edges move. Only then can its images be drawn on fewer pixels and less exactly, and is a surrogate useful.
     fn moves_edges(&self) -> bool;
 
-    /// What the paper says of it.
+    /// The paper's data on the task.
     fn paper(&self) -> &'static Paper;
 
-    /// The task with the method that flags ask for, and all else as it is by default.
+    /// The task with the method given by flags, all else at its default.
     ///
     /// # Errors
     ///
@@ -67,7 +67,7 @@ impl<T: Task> AnyTask for Of<T> {
 ///
 /// # Errors
 ///
-/// If there is none.
+/// If no task has this name.
 pub fn task(name: &str) -> anyhow::Result<&'static dyn AnyTask> {
     let found = TASKS.iter().copied().find(|task| task.name() == name);
     found.ok_or_else(|| {

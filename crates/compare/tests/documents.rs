@@ -1,4 +1,4 @@
-//! The tables of the documents are those of the records that they keep.
+//! The tables of the documents match their stored records.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

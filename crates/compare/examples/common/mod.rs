@@ -1,4 +1,4 @@
-//! What the studies share: tasks with a method, and the page that a study writes.
+//! Code shared by the studies: tasks with a method, and the page that a study writes.
 
 use std::{fs, path::Path, rc::Rc};
 
@@ -9,13 +9,13 @@ use softrast_inverse::{Method, SolveConfig};
 use softrast_lab::{Inputs, OutputFolder, write_atomically};
 use softrast_softness::Family;
 
-/// Name of the study, which is that of the example.
+/// Name of the study, equal to that of the example.
 const NAME: &str = env!("CARGO_CRATE_NAME");
 
 /// The flags of a study.
 #[derive(Parser)]
 pub(crate) struct Study {
-    /// Do so little that it takes less than a minute, and write to out/ instead of docs/studies/
+    /// Run a small version in under a minute and write to out/ instead of docs/studies/
     #[arg(long)]
     pub(crate) quick: bool,
 }
@@ -33,7 +33,7 @@ impl Study {
         write_atomically(&path, bytes).with_context(|| path.display().to_string())
     }
 
-    /// Puts `text` between the two marks that a page among the documents has for the study; in the quick mode makes a page of it.
+    /// Writes `text` between the study's two marks in a page of the documents; in the quick mode, as a separate page.
     pub(crate) fn page(&self, page: &str, text: &str) -> anyhow::Result<()> {
         if self.quick {
             return self.file(&format!("{NAME}.md"), text.as_bytes());
@@ -49,7 +49,7 @@ impl Study {
     }
 }
 
-/// A family whose scale stays.
+/// A family with fixed width.
 pub(crate) fn constant(family: Family) -> MethodArgs {
     MethodArgs {
         softness: Some(SoftnessChoice::Family(family)),
