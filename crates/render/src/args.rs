@@ -34,11 +34,11 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = angle)]
     pub(crate) fov: f64,
 
-    /// Draw the mesh as it looks, on white: its texture if it has one, else the colours of its vertices, else grey
+    /// Draw the mesh in colour, on white: its texture if it has one, else its vertex colours, else grey
     #[arg(long, conflicts_with_all = ["reference", "target", "t_conorm"])]
     pub(crate) colour: bool,
 
-    /// Picture to draw in place of the mesh's own, by its texture coordinates
+    /// Picture to use as texture instead of the mesh's own
     #[arg(long, value_name = "FILE.png", requires = "colour")]
     pub(crate) texture: Option<PathBuf>,
 
@@ -50,7 +50,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = whole::<1, 4>, requires = "colour")]
     pub(crate) samples: Option<usize>,
 
-    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file, taken as at the last step if its scale moves
+    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file, used as at the last step if its scale moves
     /// [default: logistic, uniform with --colour]
     #[arg(long, value_name = "NAME|FILE.json")]
     pub(crate) softness: Option<NameOrFile<Family>>,
@@ -59,19 +59,19 @@ pub(crate) struct Args {
     #[arg(long, value_name = "X", value_parser = positive)]
     pub(crate) scale: Option<f64>,
 
-    /// Feed a named softness the squared distance
+    /// Apply a named softness to the squared distance
     #[arg(long)]
     pub(crate) squared: bool,
 
-    /// How faces join: probabilistic, einstein, hamacher:p, frank:p, yager:p, `aczel_alsina:p`, dombi:p or `schweizer_sklar:p`
+    /// T-conorm that joins faces: probabilistic, einstein, hamacher:p, frank:p, yager:p, `aczel_alsina:p`, dombi:p or `schweizer_sklar:p`
     #[arg(long, value_name = "NAME[:p]", default_value = "probabilistic")]
     pub(crate) t_conorm: TConorm,
 
-    /// Take the mesh as it stands, instead of centring it with its longest side scaled to 2
+    /// Keep the coordinates of the mesh, instead of centring it with its longest side scaled to 2
     #[arg(long)]
     pub(crate) raw: bool,
 
-    /// Largest error of a pixel against evaluating every pixel-face pair
+    /// Largest error of a pixel relative to evaluating every pixel-face pair
     #[arg(long, value_name = "X", default_value_t = Rasterizer::TOLERANCE, value_parser = share)]
     pub(crate) tolerance: f64,
 
@@ -79,15 +79,15 @@ pub(crate) struct Args {
     #[arg(long)]
     pub(crate) reference: bool,
 
-    /// Image to compare all views with: a picture (its luminance counts), or a disk at x, y with radius r in NDC, y up
+    /// Image to compare all views with: a picture (its luminance is used), or a disk at x, y with radius r in NDC, y up
     #[arg(long, value_name = "FILE.png|disk:x,y,r")]
     pub(crate) target: Option<Target>,
 
-    /// What to draw on: ndarray, flex or wgpu, if the program was built with it; the first of these by default
+    /// Backend to draw on: ndarray, flex or wgpu, if the program was built with it; by default the first of these
     #[arg(long, value_name = "NAME", conflicts_with = "reference")]
     pub(crate) backend: Option<String>,
 
-    /// Timed repetitions, after one that is not timed [default: 5, or 1 with --reference]
+    /// Timed repetitions, after an untimed one [default: 5, or 1 with --reference]
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) repeat: Option<usize>,
 
@@ -108,7 +108,7 @@ pub(crate) struct Args {
     pub(crate) quiet: bool,
 }
 
-/// What the silhouettes should look like.
+/// Target of the silhouettes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Target {
     /// A disk with a hard edge at pixel centres, in NDC (x right, y up).

@@ -1,4 +1,4 @@
-//! The op for colours on the backend of the program.
+//! The colour op on the program's backend.
 
 use std::{array, sync::Arc, time::Instant};
 
@@ -15,14 +15,14 @@ use crate::{
     scene::{Scene, Step},
 };
 
-/// The least scale of the depth softness, against the distance between the planes: floats of 32 bits hardly tell nearer depths apart.
+/// Smallest scale of the depth softness relative to the distance between the planes: 32-bit floats hardly resolve nearer depths.
 const LEAST_DEPTH: f64 = 1e-5;
-/// Planes of nearness lie beyond the mesh by this part of the farthest depth.
+/// Distance of the depth planes from the mesh, as a fraction of the farthest depth.
 const BEYOND: f64 = 1e-3;
-/// Light that falls on a surface seen from its edge; one seen in full has 1.
+/// Light on a surface seen edge-on; one seen face-on has 1.
 const AMBIENT: f64 = 0.3;
 
-/// What stays the same from step to step.
+/// State shared by all steps.
 pub(crate) struct Coloured<B: RasterBackend> {
     renderer: ColourRenderer,
     backgrounds: [Background<B>; 2],
@@ -31,7 +31,7 @@ pub(crate) struct Coloured<B: RasterBackend> {
     orbits: Tensor<B, 2>,
     colours: Attributes<B>,
     shade: bool,
-    /// Of pixels along each side of the image, and of samples along each side of a pixel.
+    /// Pixels along each side of the image, and samples along each side of a pixel.
     sides: [usize; 2],
 }
 
@@ -40,7 +40,7 @@ impl<B: RasterBackend> Coloured<B> {
         let (vertices, orbits) = (scene.vertices::<B>(), scene.orbits::<B>());
         let depths = project(vertices.clone(), orbits.clone()).tensor().narrow(2, 2, 1);
         let renderer = renderer(scene, colour, &numbers(depths));
-        // Lights are drawn in one channel, colours in three; both are seen before black.
+        // Light has one channel, colours have three; both have a black background.
         let backgrounds = [3, 1].map(|n| renderer.background(&vec![0.0; n], &Default::default()));
         Self {
             renderer,
@@ -59,7 +59,7 @@ impl<B: RasterBackend> Coloured<B> {
         let start = Instant::now();
         let seen = project(self.vertices.clone(), self.orbits.clone()).tensor();
         let views = seen.dims()[0];
-        // One after the other: all samples of all views take much memory.
+        // One view after the other, because all samples of all views take much memory.
         let images =
             (0..views).map(|view| self.view(Projected::new(seen.clone().narrow(0, view, 1)), view));
         let (images, shares): (Vec<_>, Vec<_>) = images.unzip();
@@ -68,7 +68,7 @@ impl<B: RasterBackend> Coloured<B> {
         Step { image: images.concat(), mean_alpha, loss: None, forward_ms, backward_ms: None }
     }
 
-    /// Red, green and blue `[3, size, size]` on white, and the mean share of the faces.
+    /// Red, green and blue `[3, size, size]` on white, and the mean coverage of the faces.
     fn view(&self, seen: Projected<B>, view: usize) -> (Vec<f64>, f64) {
         let [of_colours, of_light] = &self.backgrounds;
         let drawn = numbers(self.renderer.image(seen.clone(), &self.colours, of_colours));
@@ -84,7 +84,7 @@ impl<B: RasterBackend> Coloured<B> {
         for at in 0..width * width {
             let share = shares[at];
             covered += part * share;
-            // Both are seen before black, so both hold the share of the faces.
+            // Both have a black background, so both contain the coverage of the faces.
             let lit = light.as_ref().map_or(1.0, |light| light[at] / share.max(f64::MIN_POSITIVE));
             let pixel = at / width / samples * size + at % width / samples;
             for (k, channel) in [red, green, blue].iter().enumerate() {
@@ -94,7 +94,7 @@ impl<B: RasterBackend> Coloured<B> {
         (image, covered / (size * size) as f64)
     }
 
-    /// Light on the vertices, `[1, vertices, 1]`, from where the camera stands. Either side of a surface is lit.
+    /// Light on the vertices, `[1, vertices, 1]`, from the position of the camera. Both sides of a surface are lit.
     fn light(&self, view: usize) -> Tensor<B, 3> {
         let orbit = self.orbits.clone().narrow(0, view, 1);
         let [distance, elevation, azimuth] =
@@ -108,7 +108,7 @@ impl<B: RasterBackend> Coloured<B> {
     }
 }
 
-/// What draws vertices of these depths `[views, vertices]`.
+/// The renderer for vertices at these depths, `[views, vertices]`.
 fn renderer(scene: &Scene, colour: &Colour, depths: &[f64]) -> ColourRenderer {
     let corners = || scene.faces.iter().flatten();
     let views = depths.chunks_exact(scene.vertices.len() / 3);
@@ -118,7 +118,7 @@ fn renderer(scene: &Scene, colour: &Colour, depths: &[f64]) -> ColourRenderer {
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[near, far], depth| {
             [near.min(depth), far.max(depth)]
         });
-    // Nothing is seen where all is behind the camera.
+    // Nothing is visible if everything is behind the camera.
     let [near, far] = if near <= far { [near, far] } else { [NEAR; 2] };
     let planes = [near - BEYOND * far, far + BEYOND * far];
     let depth = DepthSoftness::Family(Family::Exp);

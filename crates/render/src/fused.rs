@@ -1,4 +1,4 @@
-//! The fused op on the backend of the program.
+//! The fused op on the program's backend.
 
 use std::time::Instant;
 
@@ -12,14 +12,14 @@ use softrast_tensor::{Autodiff, ElementConversion, Tensor};
 
 use crate::scene::{Scene, Step};
 
-/// What stays the same from step to step.
+/// State shared by all steps.
 pub(crate) struct Fused<B: RasterBackend> {
     silhouette: Silhouette<EdgeSoftness>,
     table: Tensor<B, 2>,
     vertices: Tensor<B, 3>,
     orbits: Tensor<B, 2>,
     target: Option<Tensor<B, 3>>,
-    /// Time to choose the knots and fill the table, which is done once for a softness.
+    /// Time to choose the knots and fill the table, once per softness.
     pub(crate) prepare_ms: f64,
 }
 
@@ -41,7 +41,7 @@ impl<B: RasterBackend> Fused<B> {
         }
     }
 
-    /// Pairs that one pass visits, and the share of those which the default tolerance keeps that are not among them.
+    /// Number of pairs that one pass visits, and the share that it culls of those that the default tolerance keeps.
     pub(crate) fn pairs(&self, scene: &Scene) -> (usize, f64) {
         let rasterizer = Rasterizer { t_conorm: scene.t_conorm, ..Rasterizer::new(scene.size) };
         let usual = rasterizer.prepare(&scene.faces, scene.softness, &scene.phi::<B>());
@@ -80,7 +80,7 @@ impl<B: RasterBackend> Fused<B> {
         Step::of_silhouettes(values(image.inner()), loss, forward_ms, backward_ms)
     }
 
-    /// From world vertices to coverage.
+    /// Coverage of world vertices.
     fn coverage<C: RasterBackend>(
         &self,
         vertices: Tensor<C, 3>,
@@ -91,7 +91,7 @@ impl<B: RasterBackend> Fused<B> {
     }
 }
 
-/// Time since `start`, once the device has done what it was asked.
+/// Milliseconds since `start`, after the device has finished its work.
 pub(crate) fn milliseconds<B: RasterBackend>(start: Instant) -> f64 {
     B::sync(&Default::default()).expect("the device finishes its work");
     start.elapsed().as_secs_f64() * 1e3

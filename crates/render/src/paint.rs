@@ -1,4 +1,4 @@
-//! What the faces of a mesh show: a texture, colours of its vertices, or grey.
+//! Paint of a mesh's faces: a texture, vertex colours, or grey.
 
 use std::{fmt, sync::Arc};
 
@@ -12,26 +12,26 @@ use softrast_views::{Atlas, PictureFile};
 
 use crate::args::Args;
 
-/// Texels that are drawn at most, about 3500 × 3500: the op takes some 60 bytes for each. Larger pictures are reduced.
+/// Largest number of texels, about 3500 × 3500, at some 60 bytes each in the op. Larger pictures are reduced.
 const MOST_TEXELS: usize = 12 << 20;
-/// Red, green and blue of a mesh that has no colours.
+/// Red, green and blue of a mesh without colours.
 const GREY: [f64; 3] = [0.7; 3];
 
-/// Scale of the depth softness, against the longest side of the mesh: less than the thickness of what is thin.
+/// Scale of the depth softness relative to the longest side of the mesh: below the thickness of thin parts.
 const DEPTH: f64 = 0.005;
 
-/// How a mesh is drawn in colour.
+/// Settings for drawing a mesh in colour.
 pub(crate) struct Colour {
     pub(crate) paint: Paint,
     /// Whether a lamp at the camera lights it.
     pub(crate) shade: bool,
-    /// Along each side of a pixel.
+    /// Samples along each side of a pixel.
     pub(crate) samples: usize,
-    /// Scale of the depth softness in world units; none for that of the op.
+    /// Scale of the depth softness in world units; none for the default of the op.
     pub(crate) depth_scale: Option<f64>,
 }
 
-/// Colours of faces, all from 0 to 1 as screens have them.
+/// Colours of faces, sRGB from 0 to 1.
 pub(crate) enum Paint {
     Texture {
         /// `[entries, 2]`, v up.
@@ -45,12 +45,12 @@ pub(crate) enum Paint {
     Grey,
 }
 
-/// Samples along each side of an image: at most so many unless more are asked for, and at most as many as the largest image has pixels.
+/// Largest number of samples along each side of an image: by default, and on request (the pixels of the largest image).
 const USUAL_SAMPLES: usize = 2048;
 const MOST_SAMPLES: usize = 4096;
 
 impl Colour {
-    /// How `args` ask for a mesh, taken as it will be drawn, and what the user should know.
+    /// Settings requested by `args` for a mesh in its drawn position, and warnings for the user.
     pub(crate) fn of(
         mesh: &Mesh,
         args: &Args,
@@ -66,13 +66,13 @@ impl Colour {
         let (paint, warnings) = Paint::of(mesh, args, reasons)?;
         let [low, high] = mesh.bounds();
         let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
-        // Under a softness without end so narrow a one would draw near faces all over the image: docs/notes.md, Colour.
+        // With a softness of infinite support, so narrow a depth scale would draw near faces all over the image: docs/notes.md, Colour.
         let depth_scale = args.softness.is_none().then_some(DEPTH * longest);
         Ok((Self { paint, shade: args.shade, samples: samples(args), depth_scale }, warnings))
     }
 }
 
-/// Samples along each side of a pixel. Edges that are asked for show as they are.
+/// Samples along each side of a pixel, by default 1 for a requested softness or scale, so that its edges show unchanged.
 pub(crate) fn samples(args: &Args) -> usize {
     let usual = || match (&args.softness, args.scale) {
         (None, None) => (1..=4).rev().find(|n| n * args.size <= USUAL_SAMPLES).unwrap_or(1),
@@ -82,7 +82,7 @@ pub(crate) fn samples(args: &Args) -> usize {
 }
 
 impl Paint {
-    /// The paint that `args` ask for, and warnings; `reasons` say why colours or the texture are not there or not as the file has them.
+    /// The paint requested by `args`, and warnings; `reasons` explain why colours or the texture are missing or differ from the file.
     fn of(mesh: &Mesh, args: &Args, reasons: &[MeshError]) -> anyhow::Result<(Self, Vec<String>)> {
         let name = args.mesh.display();
         let mut warnings: Vec<String> = reasons.iter().map(ToString::to_string).collect();
@@ -124,7 +124,7 @@ impl Paint {
         Self::Texture { coordinates, corners: corners.into(), picture }
     }
 
-    /// As the op takes it, for these faces: three channels.
+    /// Attributes of the op for these faces: three channels.
     pub(crate) fn attributes<B: Backend>(&self, faces: &Arc<[[u32; 3]]>) -> Attributes<B> {
         match self {
             Self::Texture { coordinates, corners, picture } => {

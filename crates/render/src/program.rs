@@ -29,14 +29,14 @@ use crate::{
     scene::{Scene, Step},
 };
 
-/// Timed repetitions unless asked for another number.
+/// Default number of timed repetitions.
 const REPEAT: usize = 5;
 
-/// Does what a command line asks, the name of the program being its first word.
+/// Executes a command line, whose first word is the name of the program.
 ///
 /// # Errors
 ///
-/// Everything that should end the program with an error line. Unless only `stdout` failed, no picture was written then.
+/// Any error that should end the program with an error line. No picture is written then, unless only `stdout` failed.
 pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
     let inputs = Inputs::of_words(&words, &["--out"]);
@@ -51,7 +51,7 @@ pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failu
     output?.print(args.json, &repeated("render", &words), stdout)
 }
 
-/// All passes, and what is known of the fused op.
+/// All passes, and measurements of the fused op.
 struct Measured {
     steps: Vec<Step>,
     pairs: Option<usize>,
@@ -132,7 +132,7 @@ fn draw(args: &Args, inputs: &Inputs) -> anyhow::Result<Output> {
     Ok(Output { json, text, warnings, partial: None })
 }
 
-/// Whether a file begins as a PNG picture does.
+/// Whether a file begins with the PNG signature.
 fn is_png(path: &Path) -> bool {
     let mut head = [0; 8];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut head));
@@ -145,14 +145,14 @@ fn by_reference(scene: &Scene, repeat: usize, quiet: bool) -> Measured {
     Measured { steps, pairs: Some(pairs), culled: None, prepare_ms: None, profile: None }
 }
 
-/// After one pass to warm up.
+/// Measures `repeat` passes, after one to warm up.
 fn in_colour<B: RasterBackend>(scene: &Scene, colour: &Colour, repeat: usize) -> Measured {
     let coloured = Coloured::<B>::new(scene, colour);
     let steps = (0..=repeat).map(|_| coloured.step()).skip(1).collect();
     Measured { steps, pairs: None, culled: None, prepare_ms: None, profile: None }
 }
 
-/// After one pass to warm up.
+/// Measures `repeat` passes, after one to warm up.
 fn by_fused_op<B: RasterBackend>(scene: &Scene, repeat: usize) -> Measured {
     let fused = Fused::<B>::new(scene);
     let steps = (0..=repeat).map(|_| fused.step()).skip(1).collect();
@@ -162,7 +162,7 @@ fn by_fused_op<B: RasterBackend>(scene: &Scene, repeat: usize) -> Measured {
     Measured { steps, pairs: Some(pairs), culled: Some(culled), prepare_ms, profile }
 }
 
-/// The results for people.
+/// The results as lines of text.
 fn lines(json: &Value) -> Vec<String> {
     let number = |key: &str| json[key].as_f64();
     let count = |key: &str| json[key].as_u64().unwrap_or(0) as usize;
@@ -215,7 +215,7 @@ fn lines(json: &Value) -> Vec<String> {
     lines.into_iter().map(|(name, value)| format!("{name:<12}{value}")).collect()
 }
 
-/// The views `[views, channels, size, size]`, of one channel or three, as one picture: itself if there is one, else a contact sheet.
+/// The views `[views, channels, size, size]`, of one or three channels, as one picture: the only view, or else a contact sheet.
 fn picture(image: &[f64], size: usize, channels: usize) -> image::RgbImage {
     let drawn = |view: &[f64]| match channels {
         1 => rgb_from_gray(view, size, size),
@@ -228,7 +228,7 @@ fn picture(image: &[f64], size: usize, channels: usize) -> image::RgbImage {
     }
 }
 
-/// Columns of a sheet that is wider than high, without empty cells where that can be.
+/// Columns of a sheet that is wider than high, without empty cells if possible.
 fn columns(views: usize) -> usize {
     let root = views.isqrt() + usize::from(views.isqrt().pow(2) < views);
     (root..=2 * root).find(|columns| views.is_multiple_of(*columns)).unwrap_or(root)

@@ -15,12 +15,12 @@ use crate::{
     paint::{Colour, samples},
 };
 
-/// Everything that a measurement needs, in plain numbers.
+/// Inputs of a measurement, as plain numbers.
 pub(crate) struct Scene {
     pub(crate) faces: Arc<[[u32; 3]]>,
     /// `[vertices, 3]`, world units.
     pub(crate) vertices: Vec<f64>,
-    /// `[views, 4]`, as `softrast_raster::project` takes them.
+    /// `[views, 4]`, in the layout of `softrast_raster::project`.
     pub(crate) orbits: Vec<f64>,
     pub(crate) size: usize,
     pub(crate) softness: EdgeSoftness,
@@ -29,23 +29,23 @@ pub(crate) struct Scene {
     pub(crate) tolerance: f64,
     /// `[size, size]`, top row first.
     pub(crate) target: Option<Vec<f64>>,
-    /// How it is drawn in colour; none for silhouettes.
+    /// Settings for drawing in colour; none for silhouettes.
     pub(crate) colour: Option<Colour>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub(crate) warnings: Vec<String>,
 }
 
-/// What one pass gave and took. Times are in milliseconds.
+/// Results of one pass, and its times in milliseconds.
 pub(crate) struct Step {
     /// `[views, size, size]`, or `[views, 3, size, size]` in colour; top row first.
     pub(crate) image: Vec<f64>,
-    /// Mean over views and pixels of what the faces cover.
+    /// Mean coverage over views and pixels.
     pub(crate) mean_alpha: f64,
-    /// Mean squared difference to the target, and the norm of its gradient to the vertices.
+    /// Mean squared difference to the target, and the norm of its gradient with respect to the vertices.
     pub(crate) loss: Option<[f64; 2]>,
-    /// From world vertices to coverage, or to colours.
+    /// Time from world vertices to coverage, or to colours.
     pub(crate) forward_ms: f64,
-    /// From coverage to the loss and its gradient to the world vertices.
+    /// Time from coverage to the loss and its gradient with respect to the world vertices.
     pub(crate) backward_ms: Option<f64>,
 }
 
@@ -126,7 +126,7 @@ impl Scene {
 
 fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
     let across = args.size * if args.colour { samples(args) } else { 1 };
-    // In colour a softness that ends keeps what is in front as slim as it is: docs/notes.md, Colour.
+    // In colour, a softness of finite support does not enlarge front surfaces: docs/notes.md, Colour.
     let usual = NameOrFile::Name(if args.colour { Family::Uniform } else { Family::Logistic });
     match args.softness.as_ref().unwrap_or(&usual) {
         NameOrFile::File(_) if args.scale.is_some() || args.squared => {
@@ -134,7 +134,7 @@ fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
         }
         NameOrFile::File(path) => {
             let file = ScheduledSoftness::load(path).context("--softness")?;
-            // Where its scale moves, as at the last step: a file with a schedule keeps φ at scale 1.
+            // As at the last step if its scale moves: a file with a schedule stores φ at scale 1.
             Ok((file.softness, file.phi_at(1.0, across)))
         }
         &NameOrFile::Name(family) => {

@@ -1,4 +1,4 @@
-//! The program as called: what it prints, what it writes, and how it refuses.
+//! The program from its command line: output, files and errors.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -144,7 +144,7 @@ const RED: [u8; 3] = [255, 0, 0];
 const GREEN: [u8; 3] = [0, 255, 0];
 const BLUE: [u8; 3] = [0, 0, 255];
 const WHITE: [u8; 3] = [255; 3];
-/// Looks at the square from the front: it takes up the middle half of the image in each direction.
+/// View of the square from the front: it fills the middle half of the image in each direction.
 const FRONT: [&str; 10] = [
     "--colour",
     "--raw",
@@ -158,7 +158,7 @@ const FRONT: [&str; 10] = [
     "2",
 ];
 
-/// The square with a picture that is red and green above, blue and black below; as OBJ and, the same, as GLB.
+/// The square with a picture that is red and green above, blue and black below, as OBJ and as GLB.
 fn pictured(folder: &Path) -> [String; 2] {
     let picture = RgbImage::from_fn(32, 16, |x, y| {
         Rgb(match (x < 16, y < 8) {
@@ -212,7 +212,7 @@ fn large_pictures_take_less_than_a_gibibyte() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let written = |name: &str, side: u32, colour: ExtendedColorType, channels: usize| {
-        // Black packs well, but for a white square in the middle.
+        // Black, which compresses well, except a white square in the middle.
         let (side, mut pixels) = (side as usize, vec![0; side as usize * side as usize * channels]);
         for row in 4 * side / 9..5 * side / 9 {
             let start = (row * side + 4 * side / 9) * channels;
@@ -252,7 +252,7 @@ fn a_texture_is_seen_where_its_coordinates_place_it() {
     }
     assert_eq!(report["colour"], "texture of 32 x 16 texels");
     assert_eq!([&report["samples"], &report["shade"]], [&json!(4), &json!(false)]);
-    // A fourth of the image, but for a thousandth of it that is left to the background.
+    // A quarter of the image, except a thousandth of it for the background.
     let covered = report["mean_alpha"].as_f64().unwrap();
     assert!((0.2497..0.2503).contains(&covered), "{covered}");
     assert!(report["forward_ms"].as_f64().unwrap() > 0.0);
@@ -405,7 +405,7 @@ fn meshes_without_size_or_behind_the_camera_leave_the_picture_white() {
     let out = folder.path().join("out.png");
     for (name, obj) in [
         ("point.obj", "v 1 1 1\nf 1 1 1\n"),
-        // A vertex that no face uses does not blur the depths of those that are used.
+        // A vertex without a face does not blur the depths of the others.
         ("stray.obj", "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 1e30\nf 1 2 3\n"),
         ("behind.obj", "v 0 0 -9\nv 1 0 -9\nv 0 1 -9\nf 1 2 3\n"),
         ("far.obj", "v 0 0 3e38\nv 3e38 0 3e38\nv 0 3e38 3e38\nf 1 2 3\n"),

@@ -1,4 +1,4 @@
-//! The program leaves files alone that it has not made.
+//! The program does not touch files that it has not created.
 
 #![allow(
     clippy::unwrap_used,
@@ -17,7 +17,7 @@ use kept::{OCTAHEDRON, Program, SOFTNESS};
 const RENDER: Program =
     Program { path: env!("CARGO_BIN_EXE_render"), inputs, short: "--size 8 --repeat 1" };
 
-/// A triangle with a texture, in the words of a glTF file: its numbers are in `scene.bin`, its picture in `skin two.png`.
+/// A triangle with a texture as a glTF file, with its numbers in `scene.bin` and its picture in `skin two.png`.
 const SCENE: &str = r#"{
     "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
     "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "material": 0 }] }],

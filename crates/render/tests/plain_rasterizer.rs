@@ -1,4 +1,4 @@
-//! A textured mesh in colour, against a rasterizer without softness that is written here.
+//! Compares a textured mesh in colour with a rasterizer without softness.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -11,11 +11,11 @@ const SIZE: usize = 128;
 const SAMPLES: usize = 4;
 const DISTANCE: f64 = 2.5;
 
-/// x and y in samples from the top left, and depth, of a point seen at these degrees in a field of view of 60.
+/// x and y in samples from the top left, and depth, of a point seen from these angles, in degrees, in a field of view of 60.
 fn seen([x, y, z]: [f64; 3], azimuth: f64, elevation: f64) -> [f64; 3] {
     let [(sin_a, cos_a), (sin_e, cos_e)] =
         [azimuth, elevation].map(|angle| angle.to_radians().sin_cos());
-    // The camera stands at azimuth 0 at -z, at 90 at +x.
+    // The camera is at -z for azimuth 0, at +x for 90.
     let right = -x * cos_a - z * sin_a;
     let ground = x * sin_a - z * cos_a;
     let (up, depth) = (y * cos_e - ground * sin_e, DISTANCE - y * sin_e - ground * cos_e);
@@ -24,7 +24,7 @@ fn seen([x, y, z]: [f64; 3], azimuth: f64, elevation: f64) -> [f64; 3] {
     [scale * (1.0 + focal * right / depth), scale * (1.0 - focal * up / depth), depth]
 }
 
-/// The picture at (u, v), between the centres of its texels.
+/// The picture at (u, v), interpolated between the centres of its texels.
 fn sampled(picture: &RgbImage, [u, v]: [f64; 2]) -> [f64; 3] {
     let (width, height) = picture.dimensions();
     let (x, y) = (u * f64::from(width) - 0.5, (1.0 - v) * f64::from(height) - 0.5);
@@ -40,7 +40,7 @@ fn sampled(picture: &RgbImage, [u, v]: [f64; 2]) -> [f64; 3] {
     sum
 }
 
-/// The nearest face at each sample, on white; of each pixel the means over its samples of red, green, blue, and of what is covered.
+/// Draws the nearest face at each sample, on white: means of red, green, blue and coverage over the samples of each pixel.
 fn drawn(mesh: &Mesh, picture: &RgbImage, azimuth: f64, elevation: f64) -> Vec<[f64; 4]> {
     let texture = mesh.texture().unwrap();
     let across = SIZE * SAMPLES;
