@@ -2,27 +2,27 @@ use serde::Serialize;
 
 use crate::Tested;
 
-/// A way to fail, made worse level by level. To miss the target is a property of the softness; only numbers that are not finite are a
-/// fault of the program.
+/// A failure mode that gets worse level by level. Missing the target is a property of the softness; only non-finite numbers are a fault of
+/// the program.
 #[derive(Serialize)]
 pub struct Case {
-    /// Short and unique, such as `F02`; the letter says what is tested: F the image, G its
-    /// gradient, O an optimisation, M learning.
+    /// Short unique identifier, such as `F02`. Its letter names the tested part: F the image, G its gradient, O an optimisation, M
+    /// learning.
     pub id: &'static str,
-    /// A few words.
+    /// Short description.
     pub name: &'static str,
-    /// Whether it belongs to the quick part.
+    /// Whether the case belongs to the quick part.
     #[serde(skip)]
     pub quick: bool,
-    /// What is drawn or optimised.
+    /// The scene that is drawn or optimised.
     pub scene: &'static str,
-    /// What changes from level to level.
+    /// The perturbation, which changes from level to level.
     pub perturbation: &'static str,
-    /// What is measured.
+    /// The measured number.
     pub measure: &'static str,
-    /// When a trial counts as reached.
+    /// Criterion for a trial to count as reached.
     pub target: &'static str,
-    /// All levels for one method.
+    /// Runs all levels for one method.
     #[serde(skip)]
     pub run: fn(&Tested) -> anyhow::Result<Vec<Level>>,
 }
@@ -32,20 +32,20 @@ pub struct Case {
 pub struct Level {
     /// The strength as a word.
     pub label: String,
-    /// The strength as a number, where that makes an axis.
+    /// The strength as a number, if it makes an axis.
     pub at: Option<f64>,
-    /// What was tried at it.
+    /// Trials at this level.
     pub trials: Vec<Trial>,
 }
 
 /// One measured number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// What was measured, the lower the better.
+    /// The measured number; lower is better.
     pub value: f64,
-    /// Whether it reaches the target.
+    /// Whether the trial reaches the target.
     pub reached: bool,
-    /// Whether it and everything on the way to it are finite numbers.
+    /// Whether this and all intermediate numbers are finite.
     pub finite: bool,
 }
 
@@ -60,7 +60,7 @@ impl Trial {
         Self::at_most(f64::from(u8::from(!yes)), 0.5)
     }
 
-    /// The same, if all of these are finite numbers too.
+    /// This trial, neither finite nor reached unless all of these numbers are finite too.
     #[must_use]
     pub fn with(mut self, numbers: &[f64]) -> Self {
         self.finite &= numbers.iter().all(|x| x.is_finite());

@@ -1,4 +1,4 @@
-//! Images and gradients of flat scenes, as tasks draw them and by the definition.
+//! Images and gradients of planar scenes, as tasks draw them and by the definition.
 
 use std::marker::PhantomData;
 
@@ -8,21 +8,21 @@ use softrast_tensor::{Autodiff, NdArray, Tensor, numbers, tensor};
 
 use crate::planar_scene::{PlanarScene, Random};
 
-/// The backend in which the exact answer is found.
+/// The backend of exact results.
 pub type Exact = NdArray<f64>;
 /// The backend in which tasks run.
 pub type Single = NdArray<f32>;
 
-/// Steps of a scale that decays to a tenth. As many as leave the table, before it is made anew, almost as far behind the scale as it ever
-/// gets: a step narrows it by 4.6 %.
+/// Steps of a scale that decays to a tenth, by 4.6 % per step. At this number the table is almost as far behind the scale as it ever gets
+/// before it is rebuilt.
 const STEPS: usize = 50;
 
-/// A picture of a scene.
+/// A request for a picture of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderRequest<'a> {
-    /// With what softness; where its scale moves, as at the last step.
+    /// The softness, as at the last step if its scale moves.
     pub softness: &'a ScheduledSoftness,
-    /// What is drawn.
+    /// The scene.
     pub flat: &'a PlanarScene,
     /// Pixels a side.
     pub size: usize,
@@ -30,27 +30,27 @@ pub struct RenderRequest<'a> {
     pub tolerance: f64,
 }
 
-/// An image, and the gradient of a fixed weighted sum of its pixels to x, y and depth of the corners.
+/// An image, and the gradient of a fixed weighted sum of its pixels with respect to x, y and depth of the corners.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// Row by row.
+    /// Pixels, row by row.
     pub image: Vec<f64>,
     /// `[corners, 3]`.
     pub gradient: Vec<f64>,
 }
 
 impl<'a> RenderRequest<'a> {
-    /// At the tolerance of all tasks.
+    /// A request with the tolerance of all tasks.
     pub fn new(softness: &'a ScheduledSoftness, flat: &'a PlanarScene, size: usize) -> Self {
         Self { softness, flat, size, tolerance: Rasterizer::TOLERANCE }
     }
 
-    /// As tasks draw it, with the table that a scale that decays leaves behind.
+    /// Draws as tasks do, with the table that a decaying scale leaves behind.
     pub fn fused<B: RasterBackend>(&self) -> Drawn {
         self.renderer::<B>().draw(self.flat, &weights(self.size))
     }
 
-    /// All that it takes to draw other corners of the same faces; costs more than an image.
+    /// A renderer for other corners of the same faces; preparing it costs more than an image.
     pub fn renderer<B: RasterBackend>(&self) -> Renderer<B> {
         let rasterizer = Rasterizer { tolerance: self.tolerance, ..Rasterizer::new(self.size) };
         let layout = PhiLayout::new(self.softness.clone(), Vec::new(), STEPS, self.size);
@@ -59,7 +59,7 @@ impl<'a> RenderRequest<'a> {
         Renderer { renderer, size: self.size, backend: PhantomData }
     }
 
-    /// By the definition, over all pairs, in f64.
+    /// Draws by the definition, over all pairs, in f64.
     pub fn dense(&self) -> Drawn {
         let conorm = TConorm::Probabilistic;
         let phi = self.softness.phi_at(1.0, self.size);
@@ -72,7 +72,7 @@ impl<'a> RenderRequest<'a> {
     }
 }
 
-/// Draws faces wherever their corners are.
+/// Draws faces at any corners.
 pub struct Renderer<B: RasterBackend> {
     renderer: ScheduledRenderer,
     size: usize,
@@ -125,14 +125,14 @@ impl Drawn {
     }
 }
 
-/// Largest size of a number; NaN if one is.
+/// Largest absolute value; NaN if a number is NaN.
 pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
     let most =
         |most: f64, x: f64| if most.is_nan() || x.is_nan() { f64::NAN } else { most.max(x.abs()) };
     numbers.into_iter().fold(0.0, most)
 }
 
-/// Weights of the pixels, from -1 to 1, that single out no part of the image.
+/// Weights of the pixels, from -1 to 1, that favour no part of the image.
 pub fn weights(size: usize) -> Vec<f64> {
     let mut random = Random::new(17);
     (0..size * size).map(|_| random.within(1.0)).collect()

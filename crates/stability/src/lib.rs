@@ -1,9 +1,9 @@
-//! Where each softness fails: scenes that break rasterizers and optimisers, made worse step by step.
+//! Failure modes of each softness: scenes that break rasterizers and optimisers, worse level by level.
 //!
-//! A [`Case`] is a scene, a perturbation in levels, a measure and a target. [`run`] puts every [`Tested`] softness through every case; the
-//! [`Matrix`] says which share of trials reaches the target, with an interval, and at which level a softness begins to fail.
+//! A [`Case`] is a scene, a perturbation in levels, a measure and a target. [`run`] runs every case with every [`Tested`] softness; the
+//! [`Matrix`] reports the share of trials that reach the target, with an interval, and the level at which a softness begins to fail.
 //!
-//! What this project promises, such as that no number is ever not finite, is no case but a test: `tests/invariants`.
+//! Guarantees of this project, such as that all numbers are finite, are not cases but tests: `tests/invariants`.
 
 mod case;
 pub mod cases;

@@ -15,78 +15,78 @@ use softrast_lab::{Store, key, median, wilson_interval};
 
 use crate::{Case, Level, Tested, drawing::largest};
 
-/// All outcomes: cases down, methods across.
+/// All outcomes: one row per case, one column per method.
 #[derive(Serialize)]
 pub struct Matrix {
     /// Names of the methods.
     pub methods: Vec<String>,
     /// Cases with their outcomes, in the order of the methods.
     pub rows: Vec<Row>,
-    /// Trials in all.
+    /// Number of trials.
     pub trials: usize,
     /// Trials with a number that is not finite.
     pub non_finite: usize,
-    /// Wall time of all of them, one after the other.
+    /// Sum of the wall times of all outcomes, in seconds.
     pub seconds: f64,
 }
 
-/// One case and what came of it.
+/// One case and its outcomes.
 #[derive(Serialize)]
 pub struct Row {
-    /// What is tested, and how.
+    /// The case.
     #[serde(flatten)]
     pub case: &'static Case,
-    /// In the order of the methods.
+    /// Outcomes in the order of the methods.
     pub outcomes: Vec<Outcome>,
 }
 
-/// What one case made of one method.
+/// Outcome of one case with one method.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Outcome {
     /// The method.
     pub method: String,
-    /// Trials of all levels.
+    /// Number of trials of all levels.
     pub trials: usize,
-    /// How many reached the target.
+    /// Number of trials that reached the target.
     pub reached: usize,
-    /// 95 % interval of the share that does, after Wilson.
+    /// Wilson 95 % interval of the share that reaches it.
     pub ci95: [f64; 2],
     /// Trials with a number that is not finite; 0 unless something is broken.
     pub non_finite: usize,
-    /// From the first to the last level.
+    /// Outcomes from the first to the last level.
     pub levels: Vec<LevelOutcome>,
-    /// How the case ended where it could not be finished: a panic or an error.
+    /// Panic or error that ended the case, if any.
     pub failed: Option<String>,
-    /// Wall time.
+    /// Wall time, in seconds.
     pub seconds: f64,
 }
 
-/// What one level made of one method.
+/// Outcome of one level with one method.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LevelOutcome {
     /// The strength of the perturbation as a word.
     pub label: String,
     /// The strength as a number, if it is one.
     pub at: Option<f64>,
-    /// Trials.
+    /// Number of trials.
     pub trials: usize,
-    /// How many reached the target.
+    /// Number of trials that reached the target.
     pub reached: usize,
-    /// 95 % interval of the share that does, after Wilson.
+    /// Wilson 95 % interval of the share that reaches it.
     pub ci95: [f64; 2],
     /// Trials with a number that is not finite.
     pub non_finite: usize,
-    /// Middle measured number; none where it is not finite.
+    /// Median measured number; none if it is not finite.
     pub median: Option<f64>,
-    /// Largest measured number; none where it is not finite.
+    /// Largest measured number; none if it is not finite.
     pub worst: Option<f64>,
 }
 
-/// Runs every case with every method, on so many threads, but for what is in the store; a shard every one that is its.
+/// Runs every case with every method on `threads` threads, except those in the store; a shard runs only its own.
 ///
-/// Each thread draws in a pool of its own, which has its share of the cores. The threads of one pool cannot run cases: one that waits for an
-/// image may begin another case meanwhile, while it holds what the first needs. And a caller that is a thread of the common pool waits here
-/// without working for it, so that no case may need that pool: it may have no other thread.
+/// Each thread draws in a separate pool with its share of the cores. The threads of one pool cannot run cases: a thread that waits for an
+/// image may begin another case while it holds what the first needs. A caller that is a thread of the common pool waits here without
+/// working for it, so that no case may need that pool, which may have no other thread.
 ///
 /// # Errors
 ///
@@ -156,7 +156,7 @@ pub fn run(
     })
 }
 
-/// What an outcome is kept under.
+/// Key of an outcome in the store.
 fn key_of(case: &Case, method: &Tested) -> String {
     key(&json!({ "case": case.id, "method": method.identity() }))
 }
@@ -202,12 +202,12 @@ impl Outcome {
         }
     }
 
-    /// The first level from which on fewer than half of the trials reach the target, if there is one.
+    /// The first level at which fewer than half of the trials reach the target, if there is one.
     pub fn fails_at(&self) -> Option<&LevelOutcome> {
         self.levels.iter().find(|level| 2 * level.reached < level.trials)
     }
 
-    /// The share that reached the target, in few letters.
+    /// The share that reached the target, as a short text.
     pub fn share(&self) -> String {
         match (&self.failed, self.non_finite) {
             (Some(_), _) => "FAILED".into(),

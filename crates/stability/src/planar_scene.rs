@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-/// Triangles in the image: x and y in NDC, and the depth.
+/// Triangles in the image plane: x and y in NDC, and depth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanarScene {
     /// Corners of the faces.
     pub corners: Vec<[f64; 3]>,
-    /// Three corners each.
+    /// Three corners per face.
     pub faces: Arc<[[u32; 3]]>,
 }
 
@@ -23,7 +23,7 @@ impl PlanarScene {
         Self::loose(corners.map(|[x, y]| [x, y, 2.0]).into())
     }
 
-    /// A triangle of about a third of the image that no axis or pixel favours.
+    /// A triangle of about a third of the image, aligned with no axis or pixel.
     pub fn plain() -> Self {
         Self::triangle([[-0.61, -0.47], [0.73, -0.33], [0.08, 0.69]])
     }
@@ -43,7 +43,7 @@ impl PlanarScene {
         Self::loose(corners.collect())
     }
 
-    /// The same face `count` times.
+    /// A stack of `count` copies of one face.
     pub fn stack(count: usize) -> Self {
         let one = Self::plain().corners;
         Self::loose((0..count).flat_map(|_| one.clone()).collect())
@@ -61,7 +61,7 @@ impl PlanarScene {
         Self::loose((0..side * side).flat_map(cell).collect())
     }
 
-    /// The same with every coordinate in the image multiplied by `factor`.
+    /// This scene with every image coordinate multiplied by `factor`.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         self.corners.iter_mut().for_each(|p| {
@@ -72,16 +72,16 @@ impl PlanarScene {
     }
 }
 
-/// Numbers that look random and are always the same (`SplitMix64`).
+/// Reproducible pseudorandom numbers (`SplitMix64`).
 pub struct Random(u64);
 
 impl Random {
-    /// The numbers of a seed.
+    /// The generator of a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0xd134_2543_de82_ef95).wrapping_add(1))
     }
 
-    /// In [0, 1).
+    /// A number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -90,7 +90,7 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// From `-reach` to `reach`.
+    /// A number from `-reach` to `reach`.
     pub fn within(&mut self, reach: f64) -> f64 {
         reach * (2.0 * self.unit() - 1.0)
     }

@@ -12,7 +12,7 @@ use softrast_lab::{
 
 use crate::{Case, Matrix, Tested, cases, report, run};
 
-/// The results, for people and programs.
+/// Files of the results: the page, and the matrix as JSON.
 const PAGE: &str = "report.html";
 const MATRIX: &str = "stability.json";
 
@@ -24,7 +24,7 @@ struct Args {
     #[arg(long, value_name = "quick|all|ID,..", default_value = "quick")]
     cases: String,
 
-    /// Softness file to test as mlp, instead of the network that has not been trained
+    /// Softness file to test as mlp, instead of the untrained network
     #[arg(long, value_name = "FILE.json")]
     mlp: Option<PathBuf>,
 
@@ -40,7 +40,7 @@ struct Args {
     #[arg(long, value_name = "N", value_parser = count)]
     threads: Option<usize>,
 
-    /// Go on from what an interrupted call, or shards, have finished
+    /// Resume from the outcomes of an interrupted call, or of shards
     #[arg(long)]
     resume: bool,
 
@@ -58,12 +58,11 @@ struct Args {
     quiet: bool,
 }
 
-/// Does what a command line asks, the name of the program being its first word.
+/// Executes a command line, whose first word is the name of the program.
 ///
 /// # Errors
 ///
-/// Everything that should end the program with an error line; also, after the results are written and printed, that something is
-/// broken.
+/// Any error that should end the program with an error line, and, after the results are written and printed, a fault of the program.
 pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
     let again = repeated("stability", &words);

@@ -15,7 +15,7 @@ const READING: &str = "Share of the trials that reach the target of the case, an
 /// Smaller measured numbers are drawn as this one.
 const LEAST: f64 = 1e-9;
 
-/// The matrix and all its levels as one page that needs no other file.
+/// The matrix and all its levels as one self-contained page.
 pub(crate) fn html(matrix: &Matrix, command: &str) -> anyhow::Result<String> {
     let mut report = Report::new("stability", ABOUT);
     report.paragraph(&ended(matrix));
@@ -96,7 +96,7 @@ fn has_axis(outcome: &Outcome) -> bool {
     outcome.levels.len() > 1 && outcome.levels.iter().all(|level| level.at.is_some())
 }
 
-/// The share of trials that reach the target over the level, or with one trial at a level what is measured.
+/// Chart over the levels of the share of trials that reach the target, or of the measured number if levels have one trial.
 fn chart(row: &Row) -> (Plot, &'static str) {
     let levels = || row.outcomes.iter().flat_map(|outcome| &outcome.levels);
     let shares = levels().any(|level| level.trials > 1);

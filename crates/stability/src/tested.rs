@@ -17,45 +17,45 @@ pub struct Tested {
     /// Name of the family, or `decay`.
     pub name: String,
     family: Family,
-    /// What stands for the family at every scale.
+    /// Softness that replaces the family at every scale.
     file: Option<(SoftnessChoice, Box<ScheduledSoftness>)>,
     decays: bool,
 }
 
-/// How much wider a decay starts than it ends, where a case names one scale only.
+/// First over last scale of a decay, where a case names one scale only.
 const DECAY: f64 = 10.0;
 
-/// How a case has a task solved.
+/// Settings with which a case solves a task.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// Original or transfer.
     pub variant: Variant,
     /// Pixels a side.
     pub size: usize,
-    /// Steps; the task's where there are none.
+    /// Steps; by default those of the task.
     pub steps: Option<usize>,
-    /// Learning rate; what goes with the softness where there is none.
+    /// Learning rate; by default that of the softness.
     pub learning_rate: Option<f64>,
-    /// Scale, for a decay the last; what goes with the task where there is none.
+    /// Scale, for a decay the last; by default that of the task.
     pub scale: Option<f64>,
-    /// Seeds, from 0 on.
+    /// Number of seeds, from 0 on.
     pub runs: usize,
 }
 
 impl Tested {
-    /// A family whose scale stays.
+    /// A family with fixed width.
     pub fn family(family: Family) -> Self {
         Self { name: family.name().into(), family, file: None, decays: false }
     }
 
-    /// A logistic whose scale falls over the steps.
+    /// A logistic whose width decays over the steps.
     pub fn decay() -> Self {
         Self { name: "decay".into(), decays: true, ..Self::family(Family::Logistic) }
     }
 
-    /// The five families of the paper with a scale that stays, and a logistic with one that decays.
+    /// The five families of the paper with fixed width, and a logistic with decaying width.
     ///
-    /// `mlp` is a softness file to test in place of the network that has not been trained.
+    /// `mlp` is a softness file to test in place of the untrained network.
     ///
     /// # Errors
     ///
@@ -71,18 +71,18 @@ impl Tested {
         Ok(all)
     }
 
-    /// All that decides what it does.
+    /// Everything that determines the results of the method.
     pub(crate) fn identity(&self) -> Value {
         let file = self.file.as_ref().and_then(|(_, softness)| softness.text(Path::new("")).ok());
         json!({ "name": self.name, "file": file })
     }
 
-    /// Whether it is a network.
+    /// Whether the softness is a network.
     pub fn is_network(&self) -> bool {
         self.family == Family::Mlp
     }
 
-    /// The softness at `scale`, in NDC; one that decays ends there, ten times as narrow as it began. A file has a scale of its own.
+    /// The softness at `scale`, in NDC; a decay begins at ten times that and ends there. A file keeps its own scale.
     pub fn at(&self, scale: f64) -> ScheduledSoftness {
         let edge = EdgeSoftness::new(self.family);
         match &self.file {
@@ -96,7 +96,7 @@ impl Tested {
     ///
     /// # Errors
     ///
-    /// Those of the task.
+    /// Any error of the task.
     pub fn solve<T: Task>(&self, args: T::Args, config: &Config) -> anyhow::Result<Vec<Run>> {
         let family = SoftnessChoice::Family(self.family);
         let file = self.file.as_ref().map(|(file, _)| file.clone());
@@ -129,7 +129,7 @@ impl Tested {
     }
 }
 
-/// Where a descent came to.
+/// Result of a descent.
 pub struct Descended {
     /// Loss of each hard image after each step.
     hard: Vec<Vec<f64>>,
@@ -139,7 +139,7 @@ pub struct Descended {
     pub numbers: Vec<f64>,
 }
 
-/// Goes down from given instances of a problem, all of them side by side.
+/// Descends from given instances of a problem, all in one batch.
 ///
 /// # Errors
 ///
@@ -164,7 +164,7 @@ pub fn descend<P: InverseProblem>(
 }
 
 impl Descended {
-    /// The step after which the hard image of an instance is best; the last of equal ones.
+    /// The step after which the hard image of an instance is best; the last if several are equal.
     fn best_step(&self, instance: usize) -> usize {
         let last_best = |best: usize, step: usize| {
             if self.hard[step][instance] <= self.hard[best][instance] { step } else { best }

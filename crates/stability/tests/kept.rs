@@ -1,4 +1,4 @@
-//! The program leaves files alone that it has not made.
+//! The program does not touch files that it has not created.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! The program: what it prints, what it writes, and how it refuses.
+//! The program's output, files and errors.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -31,7 +31,7 @@ fn the_program_writes_its_matrix_as_a_page_and_as_json() {
     assert_eq!(serde_json::from_slice::<Value>(&kept).unwrap(), json);
 }
 
-/// The JSON of a command that goes well.
+/// The JSON of a successful command.
 fn run(line: &str, out: &std::path::Path) -> Value {
     let mut words: Vec<OsString> = line.split(' ').map(OsString::from).collect();
     words.extend(["--quiet".into(), "--json".into(), "--out".into(), out.into()]);
@@ -40,7 +40,7 @@ fn run(line: &str, out: &std::path::Path) -> Value {
     serde_json::from_slice(&stdout).unwrap()
 }
 
-/// Without what differs from one day to another.
+/// The matrix without its times, which differ between runs.
 fn timeless(mut matrix: Value) -> Value {
     matrix["seconds"] = Value::Null;
     for row in matrix["rows"].as_array_mut().unwrap() {

@@ -1,4 +1,4 @@
-//! Colours where they fail: what lies behind shows through, or is not felt any more.
+//! Failure modes of colours: a hidden surface shows through, or gets no gradient.
 
 use pose::{Args, Range, colour::Coloured};
 use softrast_mesh::icosphere;
@@ -46,13 +46,13 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 const SIDE: usize = 24;
-/// Pixels from the border of the squares on that count as inside.
+/// Distance from the border of the squares, in pixels, from which on pixels count as inside.
 const INSIDE: usize = 4;
 const PLANES: [f64; 2] = [1.0, 4.0];
 const GAPS: [f64; 8] = [0.01, 0.03, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0];
 
-/// The share of what is hidden in each pixel, and the gradients of the mean squared difference to a picture that shows nothing else, to
-/// the corners `[8, 3]`.
+/// Share of the hidden square in each pixel, and gradients with respect to the corners, `[8, 3]`, of the mean squared difference to a
+/// picture of that square alone.
 fn two_squares(tested: &Tested, gap: f64) -> [Vec<f64>; 2] {
     let softness = tested.at(SCALE);
     let depth = DepthSoftness::Family(Family::Exp);

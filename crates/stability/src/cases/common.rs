@@ -7,7 +7,7 @@ use crate::{Config, Level, Tested, Trial};
 /// Softness, in NDC, of cases that do not vary it.
 pub const SCALE: f64 = 0.03;
 
-/// A task as it is, on its original variant.
+/// The original variant of a task, on 24 × 24 pixels, otherwise with its defaults.
 pub(super) const ORIGINAL: Config = Config {
     variant: Variant::Original,
     size: 24,
@@ -17,11 +17,11 @@ pub(super) const ORIGINAL: Config = Config {
     runs: 1,
 };
 
-/// Places of the metrics of a task: error of the parameters, and of the hard image.
+/// Indices of a task's metrics: parameter error, and error of the hard image.
 pub(super) const PARAMETER: usize = 2;
 pub(super) const HARD: usize = 4;
 
-/// The level that each strength of a perturbation makes.
+/// One level for each strength of a perturbation.
 pub(super) fn levels<T>(
     strengths: impl IntoIterator<Item = T>,
     level: impl FnMut(T) -> anyhow::Result<Level>,
@@ -29,8 +29,8 @@ pub(super) fn levels<T>(
     strengths.into_iter().map(level).collect()
 }
 
-/// Solves seeds of a task, one trial each: the metric at `measured` where the hard image is best. It reaches its target if the run is a
-/// success.
+/// Solves seeds of a task, one trial each: the metric at index `measured` where the hard image is best. A trial reaches its target if the
+/// run succeeds.
 pub(super) fn trials<T: Task>(
     tested: &Tested,
     args: T::Args,
@@ -46,7 +46,7 @@ pub(super) fn trials<T: Task>(
     Ok(runs.iter().map(trial).collect())
 }
 
-/// The same trials with another target: at most `limit`.
+/// Trials with another target: at most `limit`.
 pub(super) fn with_limit(mut trials: Vec<Trial>, limit: f64) -> Vec<Trial> {
     trials.iter_mut().for_each(|trial| trial.reached = trial.finite && trial.value <= limit);
     trials

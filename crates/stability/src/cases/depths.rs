@@ -1,4 +1,4 @@
-//! OCCLUSION where it fails: too few steps, another depth softness, many quads.
+//! Failure modes of OCCLUSION: too few steps, another depth softness, many quads.
 
 use occlusion::{Args, Occlusion};
 use softrast_cli::Variant;
@@ -39,7 +39,7 @@ pub(super) const CASES: &[Case] = &[
     },
 ];
 
-/// Place of the share of wrong front quads.
+/// Index of the share of wrong front quads.
 const FRONT: usize = 5;
 
 const SOLVED: Config = Config { size: 24, runs: 10, ..ORIGINAL };

@@ -95,8 +95,7 @@ fn half_plane(offset: f64, angle: f64) -> PlanarScene {
     PlanarScene::triangle([place(-60.0, 0.0), place(offset, 40.0), place(offset, -40.0)])
 }
 
-/// Gradients of the sum of all pixels by moving each of these lines, an offset and an angle, to its
-/// right.
+/// Gradients of the sum of all pixels with respect to moving each of these lines (offset, angle) to its right.
 fn pushed(tested: &Tested, scale: f64, lines: &[[f64; 2]]) -> anyhow::Result<Vec<f64>> {
     let method = tested.at(scale);
     let renderer = RenderRequest::new(&method, &half_plane(0.0, 0.0), FINE).renderer::<Exact>();

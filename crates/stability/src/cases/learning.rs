@@ -27,12 +27,12 @@ pub(super) const CASES: &[Case] = &[Case {
 /// Pixels a side.
 pub const SIDE: usize = 12;
 
-/// Loose triangles against an image; the softness is what is learned.
+/// Loose triangles compared with an image; the softness is learned.
 #[derive(Clone)]
 pub struct Triangles {
     silhouette: Silhouette<EdgeSoftness>,
     target: Vec<f64>,
-    /// What a decay multiplies the last scale by at each step, as logarithms; empty if it stays.
+    /// Logarithms of the factors by which a decay is wider than its last scale, one per step; empty for a fixed width.
     wider: Vec<f64>,
 }
 
@@ -86,7 +86,7 @@ pub fn three() -> PlanarScene {
     ])
 }
 
-/// The softness is learned by what an inner loop ends with.
+/// Learns the softness from the result of an inner loop.
 pub type Inner = BilevelProblem<Exact, Triangles, Triangles, Adam>;
 
 /// Moves triangles to a target `[12, 12]`.
@@ -109,7 +109,7 @@ pub fn problem(
     }
 }
 
-/// The parameters that are learned: those of the last step.
+/// The learned parameters: those of the last step.
 pub fn phi(softness: &ScheduledSoftness) -> Tensor<Exact, 1> {
     let phi = softness.phi_at(1.0, SIDE);
     let count = phi.len();

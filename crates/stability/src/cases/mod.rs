@@ -1,4 +1,4 @@
-//! What is tested, one file for each part of a rasterizer or task.
+//! The cases, one file for each part of a rasterizer or task.
 
 mod colours;
 mod common;

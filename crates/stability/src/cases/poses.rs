@@ -1,4 +1,4 @@
-//! POSE where it fails: from afar, from too near, too sharp, too small, too fast.
+//! Failure modes of POSE: too far, too near, too sharp, too small, too fast.
 
 use pose::{Args, Pose, PoseError, Range};
 use softrast_cli::{EdgeChoice, Task, Variant};
@@ -92,7 +92,7 @@ fn with_body<R>(mesh: &Mesh, work: impl FnOnce(Args) -> anyhow::Result<R>) -> an
     work(Args { mesh: Some(path), raw: true, ..Args::default() })
 }
 
-/// Degrees that seeds of the lopsided body end off; a success is 5.
+/// Final errors of seeds of the lopsided body, in degrees; a success is 5.
 fn degrees(tested: &Tested, range: Range, config: Config) -> anyhow::Result<Vec<Trial>> {
     with_body(&lopsided()?, |args| {
         trials::<Pose>(tested, Args { range: Some(range), ..args }, &config, PARAMETER)

@@ -71,7 +71,7 @@ const SIDE: usize = 32;
 const RATE: f64 = 0.02;
 const TARGET: [[f64; 2]; 3] = [[-0.35, -0.3], [0.35, -0.2], [0.0, 0.4]];
 
-/// The target image of the triangle, hard.
+/// The hard image of the target triangle.
 pub fn target() -> Vec<f64> {
     hard(&PlanarScene::triangle(TARGET), SIDE)
 }
@@ -81,19 +81,19 @@ fn hard(flat: &PlanarScene, size: usize) -> Vec<f64> {
     numbers(hard_silhouette(Projected::new(corners), &flat.faces, size))
 }
 
-/// Triangles in the image plane that should cover a target; θ is x and y of their corners.
+/// Triangles in the image plane that should cover a target; θ holds x and y of their corners.
 pub struct Triangles {
-    /// What is moved.
+    /// The moving triangles.
     pub flat: PlanarScene,
     /// `[size, size]`.
     pub target: Vec<f64>,
-    /// Of image and target.
+    /// Loss between image and target.
     pub loss: Loss,
-    /// What the loss is multiplied by.
+    /// Factor of the loss.
     pub factor: f64,
 }
 
-/// What is lowered.
+/// The minimised loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
     /// One minus the intersection over the union.
@@ -160,33 +160,33 @@ impl InverseProblem for Triangles {
     }
 }
 
-/// `[1, corners, 3]`.
+/// Corners at depth 2, `[1, corners, 3]`.
 pub(super) fn at_depth_2<B: RasterBackend>(theta: Tensor<B, 1>) -> Projected<B> {
     let count = theta.dims()[0] / 2;
     let depth = tensor(vec![2.0; count], [1, count, 1]);
     Projected::new(Tensor::cat(vec![theta.reshape([1, count, 2]), depth], 2))
 }
 
-/// A run from the target triangle itself, moved.
+/// A run that starts at the target triangle, moved.
 #[derive(Clone, Copy)]
 pub struct Moved {
-    /// Of the softness.
+    /// Scale of the softness, in NDC.
     pub scale: f64,
-    /// In NDC.
+    /// Distance of the start from the target, in NDC.
     pub distance: f64,
-    /// One of six.
+    /// Direction of the start, one of six.
     pub direction: usize,
     /// Steps of Adam.
     pub steps: usize,
-    /// Its learning rate.
+    /// Learning rate of Adam.
     pub learning_rate: f64,
-    /// What is lowered.
+    /// The minimised loss.
     pub loss: Loss,
-    /// What the loss is multiplied by.
+    /// Factor of the loss.
     pub factor: f64,
 }
 
-/// What most cases do.
+/// Settings of most cases.
 pub const MOVED: Moved = Moved {
     scale: SCALE,
     distance: 0.3,
@@ -198,11 +198,11 @@ pub const MOVED: Moved = Moved {
 };
 
 impl Moved {
-    /// Goes down to a target.
+    /// Optimises towards a target.
     ///
     /// # Errors
     ///
-    /// None that a scene of numbers can have.
+    /// None for a scene of plain numbers.
     pub fn run(self, tested: &Tested, target: &[f64]) -> anyhow::Result<Descended> {
         let Self { scale, distance, direction, steps, learning_rate, loss, factor } = self;
         let (sin, cos) = (std::f64::consts::TAU * (direction as f64 + 0.2) / 6.0).sin_cos();
@@ -266,7 +266,7 @@ fn noise(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 }
 
 fn gray(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    /// Places a side that a gray pixel is the mean of.
+    /// Samples along each side of a gray pixel, which is their mean.
     const PLACES: usize = 8;
     let fine = hard(&PlanarScene::triangle(TARGET), PLACES * SIDE);
     let mean = |pixel: usize| {

@@ -127,7 +127,7 @@ fn winding(tested: &Tested) -> Levels {
     )])
 }
 
-/// The same faces in another order.
+/// The faces in another order.
 fn permuted(flat: &PlanarScene, seed: u64) -> PlanarScene {
     let mut random = Random::new(seed);
     let mut faces = flat.faces.to_vec();

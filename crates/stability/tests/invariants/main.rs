@@ -1,6 +1,6 @@
-//! What this project promises of every softness, whatever the scene: a trial that misses its target is a fault.
+//! Guarantees of this project for every softness and scene: a trial that misses its target is a fault.
 //!
-//! The numbers F01 and so on are those under which docs/studies/stability.md lists them.
+//! Identifiers such as F01 are those of docs/studies/stability.md.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -24,13 +24,13 @@ use stability::{
 };
 
 type Levels = anyhow::Result<Vec<Level>>;
-/// What draws some faces in both float types.
+/// Faces, and their renderers in both float types.
 type Renderers = (Arc<[[u32; 3]]>, Renderer<Exact>, Renderer<Single>);
 
 /// Width and height of small images.
 const SIZE: usize = 16;
 
-/// Holds every family there is to a promise, and a scale that decays.
+/// Checks a guarantee for every family, and for a decaying width.
 fn hold(promise: impl Fn(&Tested) -> Levels) {
     let families = Family::ALL.into_iter().map(Tested::family);
     families.chain([Tested::decay()]).for_each(|tested| hold_one(&promise, &tested));
@@ -54,14 +54,14 @@ fn the_families_without_an_end_of_their_tails_are_those_of_the_list() {
     assert_eq!(endless, ENDLESS);
 }
 
-/// Holds every family whose tails end to a promise, and a scale that decays.
+/// Checks a guarantee for every family whose tails end, and for a decaying width.
 fn hold_where_tails_end(promise: impl Fn(&Tested) -> Levels) {
     let families = Family::ALL.into_iter().filter(|family| !ENDLESS.contains(family));
     let tested = families.map(Tested::family).chain([Tested::decay()]);
     tested.for_each(|tested| hold_one(&promise, &tested));
 }
 
-/// The same for the families of the paper alone, where a promise takes whole descents.
+/// Checks a guarantee for the families of the paper only, where it takes whole descents.
 fn hold_for_the_paper(promise: impl Fn(&Tested) -> Levels) {
     Tested::all(None).unwrap().iter().for_each(|tested| hold_one(&promise, tested));
 }
@@ -87,7 +87,7 @@ fn against_dense<L: Into<String>>(
     let mut levels = Vec::new();
     for (label, flat) in scenes {
         let drawing = RenderRequest::new(&softness, &flat, SIZE);
-        // To choose the knots costs more than an image.
+        // Choosing the knots costs more than an image.
         let kept = renderers.take().filter(|(faces, ..)| *faces == flat.faces);
         let made = || (flat.faces.clone(), drawing.renderer(), drawing.renderer());
         let (_, exact, single) = renderers.insert(kept.unwrap_or_else(made));

@@ -59,8 +59,8 @@ fn differences(tested: &Tested) -> Levels {
     let level = |steps: usize| {
         let problem = problem(&softness, &three(), disk(), steps, adam);
         let at = phi(&softness);
-        // All weights of a network, which change its shape; of the others the scale: a shift of 0 is
-        // where the kink of a one-sided family leaves the edge, and has no derivative there.
+        // All weights of a network, which change its shape, but only the scale of the others: a shift of 0 puts the kink of a one-sided
+        // family on the edge, without a derivative there.
         let network = tested.is_network();
         let share = |(k, p): (usize, f64)| if network || k == 0 { 0.3 + p.abs() } else { 0.0 };
         let way: Vec<f64> = numbers(at.clone()).into_iter().enumerate().map(share).collect();
@@ -88,7 +88,7 @@ fn clipped(tested: &Tested) -> Levels {
     Ok([10, 50, 100].map(level).into())
 }
 
-/// Instances the first `broken` of every four of which have a target that is not a number.
+/// Instances of which the first `broken` of every four have a NaN target.
 struct SomeBroken<'a> {
     softness: &'a ScheduledSoftness,
     broken: u64,

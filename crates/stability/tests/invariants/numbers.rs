@@ -129,7 +129,7 @@ fn parameters(tested: &Tested) -> Levels {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("softness.json");
     let flat = PlanarScene::random(10, 12);
-    // Of families other than the network a parameter is a logarithm or a shift.
+    // Parameters of families other than the network are logarithms or shifts.
     let big = if edge.parameters() > 3 { 1e4 } else { 60.0 };
     let small = if edge.parameters() > 3 { -1.0 } else { -60.0 };
     // Name, sign of each parameter, their size.
