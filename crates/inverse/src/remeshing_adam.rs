@@ -3,46 +3,48 @@ use softrast_mesh::{ClosedSurface, Mesh, MeshError, SurfaceGeometry};
 use softrast_raster::RasterBackend;
 use softrast_tensor::{Backend, Element, Tensor, TensorData};
 
-/// Decay of the mean of gradients, and of their squared lengths.
+/// Decay rates of the mean gradient, and of the mean of its squared length.
 const BETA: [f32; 2] = [0.7, 0.9];
-/// A step of a vertex, against the target length of its edges.
+/// Step of a vertex relative to the target length of its edges.
 const RATE: f64 = 0.3;
-/// How often the gradient is smoothed, and by which part of the way to the mean of its neighbours.
+/// Number of smoothings of the gradient, and fraction of the way to the mean of its neighbours in each.
 const SMOOTHED: (usize, f32) = (2, 0.5);
-/// Part of the way to the mean of its neighbours that a vertex goes along the surface after each step: it keeps triangles even.
+/// Fraction of the way to the mean of its neighbours that a vertex moves along the surface after each step, which keeps triangles even.
 const ALONG: f32 = 0.3;
-/// A part of that way across the surface, at the usual rate; it falls with the rate. With a quarter of it the surface folds.
+/// Fraction of that way across the surface at the usual rate; it is proportional to the rate. At a quarter of it the surface folds.
 const ACROSS: f32 = 0.02;
 /// Steps from one remeshing to the next.
 const EVERY: usize = 3;
-/// Edges are so much longer than those of the most faces: not all faces have equal sides.
+/// Factor of the edge length at the largest number of faces, because not all faces are equilateral.
 const ROOM: f64 = 1.2;
-/// Squared lengths of gradients below this count as this: a vertex that nothing pulls stays.
+/// Least squared length of a gradient, so that a vertex without gradient stays.
 const LEAST: f32 = 1e-24;
-/// Columns that an optimiser keeps for each vertex: mean gradient, and the mean of its squared length.
+/// Columns of optimiser state per vertex: mean gradient, and the mean of its squared length.
 const STATE: usize = 4;
-/// First column of that.
+/// First column of the optimiser state.
 const MOMENTS: usize = ClosedSurface::OWN;
-/// First column of colours, where there are some: channels, their mean gradients, and the means of their squares.
+/// First column of colours, if there are some: channels, their mean gradients, and the means of their squares.
 const COLOURS: usize = MOMENTS + STATE;
 /// Channels of a colour.
 const CHANNELS: usize = 3;
-/// Part of the way to the mean of its neighbours that a colour goes in each step: what no view shows takes the colours around it.
+/// Fraction of the way to the mean of its neighbours that a colour moves in each step, so that unseen parts take on the colours around
+/// them.
 const BLUR: f32 = 0.05;
-/// Vertices that one thread takes at once.
+/// Vertices per parallel task.
 const AT_ONCE: usize = 1 << 11;
-/// A step of a channel at the usual rate.
+/// Step of a colour channel at the usual rate.
 const RATE_OF_COLOURS: f32 = 0.05;
 
-/// Adam for the vertices of a closed surface that is remeshed as it moves: every third step short edges collapse, long ones are split, and edges are flipped,
-/// towards a target length of edges. The state of the optimiser moves with the vertices.
+/// Adam for the vertices of a closed surface that is remeshed as it moves: every third step, short edges collapse, long ones are split, and
+/// edges are flipped, towards a target length of edges. The state of the optimiser moves with the vertices.
 ///
-/// A step of a vertex is a part of the target length, whatever the scale of the loss: there is one second moment for a vertex, that of the length
-/// of its gradient. The gradient is smoothed over neighbours, and after each step vertices move towards the middle of their neighbours, mostly along the
-/// surface. So a surface can start coarse and far off: begin with long edges and few pixels, then shorten them
-/// ([`set_length`](Self::set_length)).
+/// The step of a vertex is proportional to the target length and independent of the scale of the loss: each vertex has one second moment,
+/// that of the length of its gradient. The gradient is smoothed over neighbours, and after each step vertices move towards the mean of
+/// their neighbours, mostly along the surface. A surface can therefore start coarse and far off: begin with long edges and few pixels, then
+/// shorten the edges ([`set_length`](Self::set_length)).
 ///
-/// It goes with any loss of [`vertices`](Self::vertices) and [`faces`](Self::faces). Faces change, so draw them by `with_faces` of a renderer.
+/// It works with any loss of [`vertices`](Self::vertices) and [`faces`](Self::faces). Faces change, so draw them by `with_faces` of a
+/// renderer.
 ///
 /// ```
 /// use softrast_tensor::{Autodiff, NdArray};
@@ -63,28 +65,28 @@ const RATE_OF_COLOURS: f32 = 0.05;
 /// # Ok::<(), softrast_mesh::MeshError>(())
 /// ```
 ///
-/// Source: Palfinger 2022, whose remeshing this is, and Adam (Kingma and Ba 2015); numbers are our own.
+/// Source: Palfinger 2022 (remeshing) and Adam (Kingma and Ba 2015); the constants are our own.
 #[derive(Clone, Debug)]
 pub struct RemeshingAdam {
     surface: ClosedSurface,
     geometry: SurfaceGeometry,
-    /// Asked for edges.
+    /// Requested length of edges.
     length: f64,
     steps: usize,
-    /// Against [`RATE`].
+    /// Relative to [`RATE`].
     rate: f64,
     most: usize,
-    /// Against [`ACROSS`].
+    /// Relative to [`ACROSS`].
     smoothing: f64,
 }
 
 impl RemeshingAdam {
-    /// Faces at most, unless asked for others.
+    /// Default of the largest number of faces.
     pub const MOST_FACES: usize = 200_000;
-    /// Most by which a surface is kept smoother than usual: a vertex goes half of the way to the mean of its neighbours then.
+    /// Largest smoothing relative to the usual: a vertex then moves half the way to the mean of its neighbours.
     pub const SMOOTHEST: f64 = 25.0;
 
-    /// The optimiser at the vertices of a mesh, with edges that should have this `length` in its units.
+    /// An optimiser of the vertices of a mesh, with target edge length `length` in its units.
     ///
     /// # Errors
     ///
@@ -97,7 +99,7 @@ impl RemeshingAdam {
         Ok(Self::of_surface(ClosedSurface::new(mesh, length, STATE)?, length))
     }
 
-    /// An optimiser with a colour at each vertex, which moves with it and begins as this one.
+    /// An optimiser with a colour at each vertex, initially `colour`, which moves with the vertex.
     pub(crate) fn with_colours(
         mesh: &Mesh,
         length: f64,
@@ -118,18 +120,18 @@ impl RemeshingAdam {
         Self { surface, geometry, length, steps: 0, rate, most, smoothing }
     }
 
-    /// With another largest number of faces: edges get as long as it asks for.
+    /// Sets the largest number of faces; edges become as long as it requires.
     #[must_use]
     pub fn with_most_faces(mut self, most: usize) -> Self {
         self.most = most;
         self
     }
 
-    /// With a surface that is kept this much smoother than usual.
+    /// Sets the smoothing of the surface relative to the usual.
     ///
     /// # Panics
     ///
-    /// If it is not above 0 and at most [`SMOOTHEST`](Self::SMOOTHEST).
+    /// If `smoothing` is not above 0 and at most [`SMOOTHEST`](Self::SMOOTHEST).
     #[must_use]
     pub fn with_smoothing(mut self, smoothing: f64) -> Self {
         assert!(smoothing > 0.0 && smoothing <= Self::SMOOTHEST, "smoothing by {smoothing}");
@@ -137,21 +139,21 @@ impl RemeshingAdam {
         self
     }
 
-    /// Takes steps of this part of the usual length from now on: 1 at first, less to settle.
+    /// Sets the step length relative to the usual: 1 at first, less to settle.
     ///
     /// # Panics
     ///
-    /// If it is not positive and finite.
+    /// If `rate` is not positive and finite.
     pub fn set_rate(&mut self, rate: f64) {
         assert!(rate > 0.0 && rate.is_finite(), "a rate of {rate}");
         self.rate = rate;
     }
 
-    /// Asks for edges of this length from now on, in the units of the mesh.
+    /// Sets the target length of edges, in the units of the mesh.
     ///
     /// # Panics
     ///
-    /// If it is not positive and finite in 32 bits.
+    /// If `length` is not positive and finite in 32 bits.
     pub fn set_length(&mut self, length: f64) {
         self.surface.set_length(length);
         self.length = length;
@@ -170,7 +172,7 @@ impl RemeshingAdam {
         Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
     }
 
-    /// The surface as it is.
+    /// The current surface.
     ///
     /// # Errors
     ///
@@ -179,7 +181,7 @@ impl RemeshingAdam {
         self.surface.mesh()
     }
 
-    /// Takes a step against a gradient to the vertices, `[1, vertices, 3]`, and remeshes the surface after every third.
+    /// Takes a step against a gradient with respect to the vertices, `[1, vertices, 3]`, and remeshes the surface after every third step.
     ///
     /// # Panics
     ///
@@ -195,12 +197,13 @@ impl RemeshingAdam {
         &self.geometry
     }
 
-    /// Channels at the vertices, `[vertices, 3]`, of an optimiser that has some.
+    /// Colours at the vertices, `[vertices, 3]`, of an optimiser with colours.
     pub(crate) fn colours(&self) -> Vec<f32> {
         self.surface.columns::<CHANNELS>(COLOURS)
     }
 
-    /// [`Self::step`] against a gradient to the vertices, and one to colours if there are some, `[vertices, 3]` each. Colours stay in [0, 1].
+    /// [`Self::step`] against gradients with respect to the vertices and, if present, to colours, `[vertices, 3]` each. Colours stay in [0,
+    /// 1].
     pub(crate) fn step_by(&mut self, mut gradient: Vec<f32>, colours: Option<Vec<f32>>) {
         for _ in 0..SMOOTHED.0 {
             let away = self.geometry.umbrella(&gradient);
@@ -223,7 +226,7 @@ impl RemeshingAdam {
         }
     }
 
-    /// Takes a step of the vertices against a gradient, and a part of the way to the means of their neighbours.
+    /// Moves the vertices against a gradient, and towards the means of their neighbours.
     fn step_vertices(&mut self, gradient: &[f32]) {
         let Self { surface, geometry, .. } = self;
         let away = geometry.umbrella(geometry.positions());
@@ -252,13 +255,13 @@ impl RemeshingAdam {
         });
     }
 
-    /// Edges of the surface if it had the most faces that it may have, all with equal sides, and a little more.
+    /// Slightly more than the edge length of the surface at its largest number of faces, all equilateral.
     fn least_length(&self) -> f64 {
         let area = self.geometry.area(self.faces());
         ROOM * (4.0 / 3f64.sqrt() * area / self.most as f64).sqrt()
     }
 
-    /// Takes a step of the colours against a gradient, and a part of the way to the means of their neighbours.
+    /// Moves the colours against a gradient, and towards the means of their neighbours.
     fn step_colours(&mut self, gradient: &[f32], away: &[f32]) {
         let rate = RATE_OF_COLOURS * self.rate.sqrt() as f32;
         let width = self.surface.width();

@@ -6,32 +6,33 @@ use softrast_mesh::{Mesh, icosphere};
 use super::{stage::Stage, target::Target, view::ViewOfShape};
 use crate::RemeshingAdam;
 
-/// Fewest pixels a side, from a sphere and from a surface that is about right.
+/// Fewest pixels per side, from a sphere and from an approximate surface.
 const COARSEST: [usize; 2] = [32, 64];
-/// Fewest and most pixels a side at the end, unless others are asked for.
+/// Fewest and most pixels per side at the end, by default.
 const LEAST: f64 = 64.0;
 const MOST: f64 = 256.0;
-/// They are a multiple of this, so that they can be halved.
+/// The default is a multiple of this, so that it can be halved.
 const EVEN: f64 = 32.0;
 /// Length of edges in pixels, in all stages.
 const EDGE_PX: f64 = 2.4;
-/// Part of a stage in which edges shorten to its length.
+/// Fraction of a stage during which edges shorten to its length.
 const SHORTENS: f64 = 1.0 / 3.0;
-/// Part of the last stage after which the rate falls, and the part of itself that it falls to.
+/// Fraction of the last stage after which the rate falls, and final over initial rate.
 const SETTLES: [f64; 2] = [0.3, 0.1];
-/// Radius of the sphere, in half the extent of the object.
+/// Radius of the sphere, in units of half the extent of the object.
 const SPHERE: f64 = 0.5;
-/// Smoothness of a surface that colours pull, against that of one that they do not.
+/// Smoothing of a surface that is fitted to colours, relative to one that is not.
 const BY_COLOURS: f64 = 5.0;
-/// Steps of a stage for each step of a stage on half as many pixels a side.
+/// Steps of a stage over those of a stage at half the resolution.
 const MORE: f64 = 1.3;
 
-/// Finds the surface of an object by the gradient of what views show of it: masks, and where they are known normals and colours.
+/// Fits the surface of an object to views by gradient descent: to masks and, where known, to normals and colours.
 ///
-/// A closed surface is remeshed as it moves ([`RemeshingAdam`]), first on few pixels with long edges, then on more pixels with shorter ones. Each step
-/// draws one view. The loss of a pixel is the absolute difference of coverage, of normals, and of colours; colours of vertices are found along with the
-/// shape. On the last pixels coverage is hard, with the gradient of soft coverage ([`SoftRenderer::with_hard_image`](softrast_raster::SoftRenderer::with_hard_image)):
-/// soft coverage would leave the surface inside of what it should be. It runs on the CPU, and with the same steps its result is the same.
+/// A closed surface is remeshed as it moves ([`RemeshingAdam`]), first on few pixels with long edges, then on more pixels with shorter
+/// ones. Each step draws one view. The loss of a pixel is the absolute difference of coverage, of normals, and of colours; vertex colours
+/// are optimised together with the shape. At the final resolution coverage is hard, with the gradient of soft coverage
+/// ([`SoftRenderer::with_hard_image`](softrast_raster::SoftRenderer::with_hard_image)), because soft coverage would leave the surface too
+/// far inside. The fit runs on the CPU, and its result is reproducible with the same steps.
 ///
 /// The object lies around the origin, as in the frame of [`frame_of_masks`](softrast_views::frame_of_masks).
 ///
@@ -62,68 +63,68 @@ pub struct ShapeFit<'a> {
     told: Box<Told<'a>>,
 }
 
-/// Called with the number of steps taken, and the loss they led to.
+/// Callback with the number of steps taken, and the loss of the last one.
 type Told<'a> = dyn FnMut(usize, f64) -> anyhow::Result<()> + 'a;
 
-/// A surface that was found.
+/// A fitted surface.
 #[derive(Debug)]
 pub struct FoundShape {
-    /// The surface: closed, nowhere branching, and in the colours of the views if they have some.
+    /// The surface: closed, manifold, and in the colours of the views if they have some.
     pub mesh: Mesh,
-    /// The error of `progress` that ended the search early; the mesh is as it was then.
+    /// The error of `progress` that ended the fit early, if any; the mesh is that of the last step then.
     pub stopped: Option<anyhow::Error>,
 }
 
 impl<'a> ShapeFit<'a> {
-    /// Most by which a surface is kept smoother than usual.
+    /// Largest smoothing relative to the usual.
     pub const SMOOTHEST: f64 = RemeshingAdam::SMOOTHEST / BY_COLOURS;
 
-    /// A search from a sphere, with 500 steps, on as many pixels as the pictures have around the object, up to 256 × 256.
+    /// A fit from a sphere, with 500 steps, at the resolution of the pictures around the object, from 64 × 64 to 256 × 256 pixels.
     pub fn new(views: Vec<ViewOfShape>) -> Self {
         let told = Box::new(|_, _| Ok(()));
         let pixels = views.iter().map(ViewOfShape::pixels).fold(0.0, f64::max);
-        // Whole numbers of pixels on a few levels.
+        // Sizes that stay whole over a few halvings.
         let size = ((pixels / EVEN).round() * EVEN).clamp(LEAST, MOST) as usize;
         let (steps, most, smoothing) = (500, RemeshingAdam::MOST_FACES, 1.0);
         Self { views, start: None, steps, size, most, smoothing, told }
     }
 
-    /// From this surface on, which is about right and closed.
+    /// Starts at this surface, which is closed and approximately right.
     pub fn starting_at(self, mesh: Mesh) -> Self {
         Self { start: Some(mesh), ..self }
     }
 
-    /// With so many steps in all.
+    /// Sets the total number of steps.
     pub fn with_steps(self, steps: usize) -> Self {
         Self { steps, ..self }
     }
 
-    /// Up to images of `size` × `size` pixels, at least 8. Edges get 2.4 pixels of them long.
+    /// Sets the final resolution to `size` × `size` pixels, `size` being at least 8. Edges become 2.4 of these pixels long.
     pub fn with_size(self, size: usize) -> Self {
         Self { size, ..self }
     }
 
-    /// With at most so many faces.
+    /// Sets the largest number of faces.
     pub fn with_most_faces(self, most: usize) -> Self {
         Self { most, ..self }
     }
 
-    /// With a surface that is kept this much smoother than usual.
+    /// Sets the smoothing of the surface relative to the usual.
     ///
     /// # Panics
     ///
-    /// If it is not above 0 and at most [`SMOOTHEST`](Self::SMOOTHEST).
+    /// If `smoothing` is not above 0 and at most [`SMOOTHEST`](Self::SMOOTHEST).
     pub fn with_smoothing(self, smoothing: f64) -> Self {
         assert!(smoothing > 0.0 && smoothing <= Self::SMOOTHEST, "smoothing by {smoothing}");
         Self { smoothing, ..self }
     }
 
-    /// Tells the steps taken and the loss they led to, a mean over pixels. An error ends the search.
+    /// Sets a callback with the number of steps taken and the loss, a mean over pixels. An error ends the fit.
     pub fn progress(self, told: impl FnMut(usize, f64) -> anyhow::Result<()> + 'a) -> Self {
         Self { told: Box::new(told), ..self }
     }
 
-    /// Runs the search.
+    /// Runs the fit.
     ///
     /// # Errors
     ///
@@ -196,7 +197,7 @@ impl<'a> ShapeFit<'a> {
         }
     }
 
-    /// The surface at the start, with edges of this length.
+    /// The initial surface, with edges of this length.
     fn shape(
         &mut self,
         half: f64,
@@ -215,14 +216,14 @@ impl<'a> ShapeFit<'a> {
             Some(colour) => RemeshingAdam::with_colours(&start, length, colour)?,
             None => RemeshingAdam::new(&start, length)?,
         };
-        // What colours say of a surface is noisy, and normals say it better.
+        // Colours are a noisy cue to the surface, normals a better one.
         let by_colours = colour.is_some() && self.views.iter().all(|view| view.normals.is_none());
         let usual = if by_colours { BY_COLOURS } else { 1.0 };
         Ok(shape.with_most_faces(self.most).with_smoothing(usual * self.smoothing))
     }
 }
 
-/// The mean colour of all that counts of some targets.
+/// The mean colour of the pixels of some targets, weighted by the part that counts.
 fn mean_colour(targets: &[Target]) -> [f32; 3] {
     let colours = || targets.iter().filter_map(|target| target.colours.as_ref());
     let counts: f32 = colours().flat_map(|colours| &colours.part).sum();

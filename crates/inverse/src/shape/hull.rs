@@ -6,10 +6,11 @@ use crate::silhouette_pixels;
 
 /// Cells of the visual hull along its longest side, from few to many: thin parts need more of them.
 const CELLS: [usize; 3] = [32, 45, 64];
-/// More cells are worth their time if the mean `IoU` of the hull grows by this much.
+/// Increase of the hull's mean `IoU` that makes more cells worth their time.
 const GROWS: f64 = 0.01;
 
-/// The [`visual_hull`](softrast_views::visual_hull) of views in as few cells as show the masks, a start for a [`ShapeFit`](super::ShapeFit).
+/// The [`visual_hull`](softrast_views::visual_hull) of views in as few cells as reproduce the masks, as a start for a
+/// [`ShapeFit`](super::ShapeFit).
 ///
 /// # Errors
 ///

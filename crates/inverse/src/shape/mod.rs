@@ -1,4 +1,4 @@
-//! The shape of a mesh from what cameras see of it: masks, normals and colours, each if there are some.
+//! The shape of a mesh fitted to masks and, if present, normals and colours.
 
 mod fit;
 mod hull;

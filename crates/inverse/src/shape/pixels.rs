@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::target::{Channels, Target};
 
-/// Pixels that one thread takes at once.
+/// Pixels per parallel task.
 const AT_ONCE: usize = 1 << 13;
 
-/// Adds the absolute differences of coverage and mask, and the gradient to coverage. Both are `[pixels]`.
+/// Sum of the absolute differences of coverage and mask. Adds its gradient with respect to coverage; both are `[pixels]`.
 pub(super) fn judge_mask(target: &Target, coverage: &[f32], to_coverage: &mut [f32]) -> f64 {
     let of = |(part, to): (usize, &mut [f32])| {
         let pixels = part * AT_ONCE..part * AT_ONCE + to.len();
@@ -23,10 +23,11 @@ pub(super) fn judge_mask(target: &Target, coverage: &[f32], to_coverage: &mut [f
     to_coverage.par_chunks_mut(AT_ONCE).enumerate().map(of).sum()
 }
 
-/// Adds the absolute differences of three drawn channels and the known ones, and the gradients to the channels `[3, pixels]` and to coverage.
+/// Sum of the absolute differences of three drawn channels and the known ones. Adds its gradients with respect to the channels, `[3,
+/// pixels]`, and to coverage.
 ///
-/// A channel c shows `a c` where coverage is a. Where a pixel of the target counts in full or not at all, the outline is not known: there `p a c` is
-/// compared with `a` times what is known, p the part that counts, and coverage is not moved.
+/// A channel c contributes `a c` at coverage a. Where pixels of the target count in full or not at all, the outline is unknown: `p a c` is
+/// compared with `a` times the known value, p being the fraction that counts, and coverage gets no gradient.
 pub(super) fn judge_channels(
     (target, counted): (&Channels, &[f32]),
     coverage: &[f32],
@@ -74,7 +75,7 @@ fn sign(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Numbers from 0 to 1 that seem to follow no rule.
+    /// Irregular numbers from 0 to 1.
     fn numbers(count: usize, seed: f32) -> Vec<f32> {
         (0..count).map(|k| (0.5 + 0.5 * (seed + 2.7 * k as f32).sin()).clamp(0.0, 1.0)).collect()
     }
@@ -116,7 +117,7 @@ mod tests {
                     judged(&coverage, &channels).0
                 };
                 let slope = (moved(h) - moved(-h)) / f64::from(2.0 * h);
-                // Where channels move no coverage, the slope has their part too.
+                // The slope contains the channels' part even where they give coverage no gradient.
                 let found = if k < COUNT { to_coverage[k] } else { to_channels[k - COUNT] };
                 if k >= COUNT || !is_opaque {
                     assert!((slope - f64::from(found)).abs() < 2e-2, "{k}: {slope} {found}");

@@ -18,7 +18,7 @@ type B = Autodiff<HostBackend>;
 
 /// Scale of the soft edge, in pixels.
 const EDGE_PX: f64 = 0.35;
-/// Scale of the depth softness, in half the extent of the object.
+/// Scale of the depth softness, in units of half the extent of the object.
 const DEPTH: f64 = 0.02;
 /// Largest error of a pixel, in coverage or in the range of the channels.
 const TOLERANCE: f64 = 1e-3;
@@ -27,7 +27,7 @@ const SAMPLES: usize = 2;
 /// Channels of normals, and of colours.
 const CHANNELS: usize = 3;
 
-/// Views on some number of pixels, and what draws the surface there.
+/// Views at one resolution, and the renderers of the surface there.
 pub(super) struct Stage {
     targets: Vec<Target>,
     cameras: Vec<Pinhole>,
@@ -42,13 +42,13 @@ pub(super) struct Pulled {
     pub(super) loss: f64,
     /// `[vertices, 3]`.
     pub(super) vertices: Vec<f32>,
-    /// The gradient to the colours of vertices, where they are looked for.
+    /// The gradient with respect to vertex colours, if they are optimised.
     pub(super) colours: Option<Vec<f32>>,
 }
 
 impl Stage {
-    /// Renderers for these targets of all views. The object reaches so far from the origin. Where `is_hard`, coverage is hard, and differentiated as if it
-    /// were soft.
+    /// Renderers for these targets of all views, of an object within `reach` of the origin. If `is_hard`, coverage is hard, with the
+    /// gradient of soft coverage.
     pub(super) fn new(
         views: &[ViewOfShape],
         targets: Vec<Target>,
@@ -63,9 +63,9 @@ impl Stage {
         let edge = EdgeSoftness::new(Family::CubicHermite);
         let scale = EDGE_PX * 2.0 / size as f64;
         let depth = DEPTH * reach / (planes[1] - planes[0]);
-        // The surface brings its own faces.
+        // The faces of the surface replace this one.
         let face = [[0, 1, 2]];
-        // Of two front faces side by side the bounded sum is exact.
+        // The bounded sum is exact for two adjacent front faces.
         let silhouettes = SoftRenderer::new(&face, size, edge, scale)
             .with_tolerance(TOLERANCE)
             .with_t_conorm(TConorm::Yager(1.0))
@@ -133,7 +133,7 @@ impl Stage {
         Pulled { loss: loss / pixels as f64, vertices: to_vertices, colours }
     }
 
-    /// Halves of normals and colours as the view shows them, if there are some.
+    /// Half normals and colours in the view, if there are some.
     fn drawn(
         &self,
         shape: &RemeshingAdam,
@@ -156,7 +156,7 @@ impl Stage {
     }
 }
 
-/// Channels that a view shows of a surface, beside its coverage.
+/// Channels of a surface in a view, in addition to its coverage.
 struct Drawn {
     /// Numbers at vertices, `[1, vertices, channels]`.
     channels: Tensor<B, 3>,
@@ -174,25 +174,25 @@ fn triples(numbers: &[f32], width: usize, first: usize) -> Vec<f32> {
     all
 }
 
-/// Rows of three of one list, each followed by one of the other.
+/// Rows of three of one list, each followed by a row of the other.
 fn beside(first: &[f32], second: &[f32]) -> Vec<f32> {
     let rows = first.as_chunks::<CHANNELS>().0.iter().zip(second.as_chunks::<CHANNELS>().0);
     rows.flat_map(|(first, second)| first.iter().chain(second)).copied().collect()
 }
 
-/// Numbers `[vertices, width]` to differentiate by, `[1, vertices, width]`.
+/// A leaf to differentiate, `[1, vertices, width]`, with the numbers `[vertices, width]`.
 fn leaf(numbers: Vec<f32>, width: usize) -> Tensor<B, 3> {
     let shape = [1, numbers.len() / width, width];
     Tensor::from_data(TensorData::new(numbers, shape), &Default::default()).require_grad()
 }
 
-/// The sum of an image along a direction, whose gradient to the image that is.
+/// Inner product of an image and a direction, whose gradient with respect to the image is the direction.
 fn along<const D: usize>(image: Tensor<B, D>, direction: Vec<f32>) -> Tensor<B, 1> {
     let data = TensorData::new(direction, image.shape());
     (image * Tensor::from_data(data, &Default::default())).sum()
 }
 
-/// Numbers of a tensor. Where others hold it too, reading it through its data goes number by number.
+/// Numbers of a tensor, read in place: conversion through the data of a shared tensor goes number by number.
 fn floats<const D: usize>(tensor: Tensor<HostBackend, D>) -> Vec<f32> {
     let in_place =
         HostBackend::numbers(&tensor.clone().into_primitive().tensor()).map(<[f32]>::to_vec);

@@ -2,15 +2,15 @@ use softrast_views::Picture;
 
 use super::view::{Shown, ViewOfShape};
 
-/// Numbers of the square of a view on so many pixels, row by row from the top.
+/// The square of a view at one resolution, row by row from the top.
 #[derive(Clone, Debug)]
 pub(super) struct Target {
     pub(super) size: usize,
-    /// How much of each pixel the object covers.
+    /// Coverage of each pixel by the object.
     pub(super) mask: Vec<f32>,
-    /// How much of each pixel the picture covers.
+    /// Coverage of each pixel by the picture.
     pub(super) counted: Vec<f32>,
-    /// Halves of normals.
+    /// Half normals.
     pub(super) normals: Option<Channels>,
     pub(super) colours: Option<Channels>,
 }
@@ -18,10 +18,10 @@ pub(super) struct Target {
 /// Three channels of a target.
 #[derive(Clone, Debug)]
 pub(super) struct Channels {
-    /// Each times the part of each pixel that counts.
+    /// Channels times the fraction of each pixel that counts.
     pub(super) levels: [Vec<f32>; 3],
     pub(super) part: Vec<f32>,
-    /// Whether pixels count in full or not at all, up to what averaging makes of it.
+    /// Whether pixels count in full or not at all, except for averaging.
     pub(super) is_opaque: bool,
 }
 

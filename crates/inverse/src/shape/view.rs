@@ -2,14 +2,14 @@ use anyhow::Context;
 use softrast_raster::Pinhole;
 use softrast_views::{PaintedView, Picture, View};
 
-/// The square of a view that is drawn is this much larger than its mask.
+/// Extent of the drawn square of a view, relative to its mask.
 const MARGIN: f64 = 1.15;
 
-/// A view of an object whose shape is looked for: its mask, and its normals and colours if there are some.
+/// A view of an object whose shape is fitted: its mask and, if present, its normals and colours.
 #[derive(Clone, Debug)]
 pub struct ViewOfShape {
     camera: Pinhole,
-    /// The square that is drawn: its left, its top and its extent in pixels.
+    /// The drawn square: left, top and extent in pixels.
     pub(super) square: [f64; 3],
     pub(super) mask: Picture,
     pub(super) normals: Option<Shown>,
@@ -19,9 +19,9 @@ pub struct ViewOfShape {
 /// Three channels of a picture.
 #[derive(Clone, Debug)]
 pub(super) struct Shown {
-    /// Each over black.
+    /// Channels over black.
     pub(super) channels: [Picture; 3],
-    /// The part of each pixel that counts.
+    /// Fraction of each pixel that counts.
     pub(super) part: Picture,
     /// Whether pixels count in full or not at all.
     pub(super) is_opaque: bool,
@@ -49,13 +49,13 @@ impl ViewOfShape {
         Ok(Self { camera, square, mask, normals: None, colours: None })
     }
 
-    /// With the colours of a picture of the same pixels.
+    /// Adds the colours of a picture of the same pixels.
     #[must_use]
     pub fn with_colours(self, painted: &PaintedView) -> Self {
         Self { colours: Some(Shown::of(painted)), ..self }
     }
 
-    /// With a picture of the same pixels whose red, green and blue are `(n + 1) / 2` of unit normals n in the axes of the world.
+    /// Adds normals: a picture of the same pixels whose red, green and blue are `(n + 1) / 2` of unit normals n in world axes.
     #[must_use]
     pub fn with_normals(self, painted: &PaintedView) -> Self {
         Self { normals: Some(Shown::of(painted)), ..self }
@@ -67,7 +67,7 @@ impl ViewOfShape {
         self.camera.cropped([left, top], [extent; 2], size)
     }
 
-    /// Pixels of the picture a side of its square.
+    /// Side of the square, in pixels of the picture.
     pub(super) fn pixels(&self) -> f64 {
         self.square[2]
     }
