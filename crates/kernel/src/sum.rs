@@ -18,7 +18,7 @@ use super::{
 };
 use crate::ImageSize;
 
-/// Faces are chosen by what they pull where one in this many pixels, or more, has no upstream.
+/// Faces are selected by their upstream if one in this many pixels, or more, has none.
 const MOST_PULLED: usize = 4;
 
 /// The inputs of sums of a profile, in one float type.
@@ -160,7 +160,8 @@ fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, length: usize) -> Vec
     padded
 }
 
-/// Faces of a band that reach a pixel whose upstream is not 0; nothing where most pixels have one, and the choice would cost more than it saves.
+/// Faces of a band that reach a pixel whose upstream is not 0; `None` if most pixels have one, where the selection would cost more than it
+/// saves.
 fn pulled<F: lanes::Float>(
     upstream: &[F],
     faces: &[u32],
@@ -171,7 +172,7 @@ fn pulled<F: lanes::Float>(
     if zeros < upstream.len() / MOST_PULLED {
         return None;
     }
-    // How many pixels above and to the left of each have an upstream.
+    // Number of pixels with an upstream above and to the left of each.
     let (width, height) = (upstream.len() / rows.len().max(1), rows.len());
     let stride = width + 1;
     let mut counts = vec![0u32; stride * (height + 1)];
@@ -227,7 +228,7 @@ fn gradient<T: Real>(
         };
         let faces = some.map_or(Cow::Borrowed(whole.numbers), Cow::Owned);
         let place = BandRef { numbers: &faces, ..whole };
-        // Of floats, the image is a pass of its own. Of dual numbers it comes along, which costs little.
+        // For floats, the image is a separate pass. For dual numbers it is part of this one, at little cost.
         let length = if T::DUAL { place.length(scene) } else { 0 };
         let mut walked = Walked {
             corners: vec![[zero; 6]; faces.len()],

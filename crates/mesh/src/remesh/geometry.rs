@@ -2,12 +2,12 @@ use rayon::prelude::*;
 
 use super::{difference, dot, normal};
 
-/// Normals shorter than this, of vertices without a face of some area, stay as they are.
+/// Least length by which normals are divided; those of vertices whose faces have no area are shorter.
 const LEAST: f32 = 1e-30;
-/// Faces or vertices that one thread takes at once.
+/// Faces or vertices per parallel task.
 const AT_ONCE: usize = 1 << 11;
 
-/// Positions and normals of the vertices of a closed surface, each of which has a face; all flat, three numbers for each vertex.
+/// Positions and normals of the vertices of a closed surface, each of which has a face, as flat lists of three numbers per vertex.
 ///
 /// ```
 /// use softrast_mesh::{SurfaceGeometry, icosphere};
@@ -32,7 +32,7 @@ impl SurfaceGeometry {
     ///
     /// # Panics
     ///
-    /// If a face names a vertex that has no position.
+    /// If a face refers to a vertex without a position.
     pub fn new(faces: &[[u32; 3]], positions: Vec<f32>) -> Self {
         let around = Around::new(faces, positions.len() / 3);
         let mut geometry = Self { positions, normals: Vec::new(), lengths: Vec::new(), around };
@@ -75,7 +75,7 @@ impl SurfaceGeometry {
         self.turn(faces);
     }
 
-    /// Makes the normals those of the positions.
+    /// Recomputes the normals from the positions.
     fn turn(&mut self, faces: &[[u32; 3]]) {
         let of_faces: Vec<[f32; 3]> =
             faces.par_iter().with_min_len(AT_ONCE).map(|face| self.normal(face)).collect();
@@ -96,7 +96,7 @@ impl SurfaceGeometry {
     ///
     /// If `upstream` is shorter than the normals.
     pub fn pulled_back(&self, faces: &[[u32; 3]], upstream: &[f32]) -> Vec<f32> {
-        // Along a unit normal nothing changes.
+        // The component along a unit normal has no effect.
         let to_sum = |vertex: usize| {
             let (n, g) = (at(&self.normals, vertex as u32), at(upstream, vertex as u32));
             let along = dot(n, g);
@@ -108,7 +108,7 @@ impl SurfaceGeometry {
             let (u, v) = (difference(b, a), difference(c, a));
             let [ga, gb, gc] = face.map(|v| at(&to_sums, v));
             let g = [0, 1, 2].map(|k| ga[k] + gb[k] + gc[k]);
-            // Of u × v.
+            // Gradient of u × v.
             let (to_b, to_c) = (cross(v, g), cross(g, u));
             [[0, 1, 2].map(|k| -to_b[k] - to_c[k]), to_b, to_c]
         };
@@ -117,11 +117,11 @@ impl SurfaceGeometry {
         self.around.gathered(|corner| of_faces[corner / 3][corner % 3])
     }
 
-    /// The umbrella Laplacian of numbers `[vertices, 3]`: the mean of the neighbours less the vertex.
+    /// The umbrella Laplacian of numbers `[vertices, 3]`: the mean of the neighbours minus the vertex.
     ///
     /// # Panics
     ///
-    /// If there are fewer numbers than vertices have.
+    /// If there are fewer than three numbers per vertex.
     pub fn umbrella(&self, numbers: &[f32]) -> Vec<f32> {
         let Around { starts, ends, .. } = &self.around;
         self.around.of_vertices(|vertex| {
@@ -137,13 +137,13 @@ impl SurfaceGeometry {
     }
 }
 
-/// Faces and edges around each vertex, in lists one after the other.
+/// Faces and edges around each vertex, as concatenated lists.
 #[derive(Clone, Debug)]
 struct Around {
     starts: Vec<u32>,
     /// The other end of each edge.
     ends: Vec<u32>,
-    /// Three times each face, and which of its corners lies at the vertex.
+    /// Three times the face, plus the index of its corner at the vertex.
     corners: Vec<u32>,
 }
 
@@ -166,7 +166,7 @@ impl Around {
         Self { starts, ends, corners }
     }
 
-    /// Three numbers for each vertex.
+    /// Computes three numbers for each vertex.
     fn of_vertices(&self, of: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<f32> {
         let mut all = vec![0.0; 3 * (self.starts.len() - 1)];
         let each = all.as_chunks_mut().0.par_iter_mut().with_min_len(AT_ONCE).enumerate();
@@ -174,7 +174,7 @@ impl Around {
         all
     }
 
-    /// The sum of what the corners at each vertex have, `[vertices, 3]`, in the order of the faces.
+    /// Sums over the corners at each vertex, `[vertices, 3]`, in the order of the faces.
     fn gathered(&self, of_corner: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<f32> {
         self.of_vertices(|vertex| {
             let corners = self.starts[vertex] as usize..self.starts[vertex + 1] as usize;

@@ -86,7 +86,7 @@ impl HalfEdges {
         self.from.as_chunks().0
     }
 
-    /// Leaves out dead faces and vertices that are gone, and the numbers of those, `[vertices, width]`.
+    /// Removes dead faces and merged or unused vertices, with the vertices' numbers, `[vertices, width]`.
     pub(super) fn compact(&mut self, numbers: &mut Vec<f32>, width: usize) {
         let vertex_of = places(&self.is_gone);
         let face_of = places(&self.is_dead);
@@ -116,7 +116,7 @@ impl HalfEdges {
     }
 }
 
-/// Where each of a list comes to lie without those that are left out, which have no place.
+/// New index of each item after removal of those in `left_out`, which get [`NONE`].
 fn places(left_out: &[bool]) -> Vec<u32> {
     let mut count = 0;
     let mut place = |&out: &bool| {

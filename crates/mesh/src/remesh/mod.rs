@@ -62,8 +62,8 @@ impl ClosedSurface {
     /// Number of columns before those of the caller.
     pub const OWN: usize = 4;
 
-    /// The surface of a mesh, with edges that should have this `length` in its units, and `more` numbers of 0 for each vertex.
-    /// Vertices without a face are left out.
+    /// The surface of a mesh, with target edge length `length` in its units, and `more` numbers of 0 for each vertex. Vertices without a
+    /// face are excluded.
     ///
     /// # Errors
     ///
@@ -79,7 +79,7 @@ impl ClosedSurface {
             (0..3).for_each(|k| row[k] = place[k] as f32);
         }
         let mut edges = HalfEdges::new(mesh.faces(), mesh.positions().len())?;
-        // Vertices without a face would stay where they are.
+        // Vertices without a face would never move.
         edges.compact(&mut numbers, width);
         let mut surface = Self { edges, numbers, width };
         surface.set_length(length);
@@ -101,7 +101,7 @@ impl ClosedSurface {
         &mut self.numbers
     }
 
-    /// N columns of all vertices from this one on, `[vertices, N]`.
+    /// N columns of all vertices from column `first` on, `[vertices, N]`.
     ///
     /// # Panics
     ///
@@ -115,7 +115,7 @@ impl ClosedSurface {
         all
     }
 
-    /// Numbers of a vertex.
+    /// Count of numbers per vertex.
     pub fn width(&self) -> usize {
         self.width
     }

@@ -32,7 +32,7 @@ pub fn visual_hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
     VisualHull::new(views)?.mesh(cells)
 }
 
-/// What masks rule out, to make [`visual_hull`]s of several numbers of cells of it.
+/// The space that masks exclude, to make [`visual_hull`]s of it with several numbers of cells.
 pub struct VisualHull<'a> {
     cones: Vec<Cone<'a>>,
     centre: [f64; 3],
@@ -51,7 +51,7 @@ impl<'a> VisualHull<'a> {
         Ok(Self { cones, centre, reach })
     }
 
-    /// The [`visual_hull`] of so many cells.
+    /// The [`visual_hull`] with `cells` cells along its longest side.
     ///
     /// # Errors
     ///

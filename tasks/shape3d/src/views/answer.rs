@@ -1,4 +1,4 @@
-//! What is said of a mesh that was made of views, and what is written beside it.
+//! The report on a mesh fitted to views, and the files written with it.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use softrast_views::{Frame, View, faces_across_note};
 use super::{painted::Colours, textured::Textured};
 use crate::Args;
 
-/// Files of every result, and those of one in colour.
+/// Files of every result, and of a result in colour.
 const MESHES: [&str; 3] = ["mesh.obj", "mesh.ply", "mesh.glb"];
 const VIEWS: &str = "views.png";
 const IN_COLOUR: [&str; 5] =
@@ -29,7 +29,7 @@ pub(super) fn names(in_colour: bool) -> impl Iterator<Item = &'static str> {
     MESHES.into_iter().chain([VIEWS]).chain(IN_COLOUR.into_iter().filter(move |_| in_colour))
 }
 
-/// Views that a picture of the result shows.
+/// Largest number of views in a picture of the result.
 const SHOWN: usize = 12;
 
 /// A view, how well the result fits it, and whether it was held out.
@@ -38,7 +38,7 @@ pub(super) struct Scored {
     /// The silhouette over the mask, for a page.
     pub(super) overlay: RgbImage,
     pub(super) iou: f64,
-    /// If colours were asked for.
+    /// The colours, if requested.
     pub(super) colours: Option<Colours>,
     pub(super) held_out: bool,
 }
@@ -59,18 +59,18 @@ impl Scored {
     }
 }
 
-/// The mean of a score of the views that were held out, or of the others.
+/// The mean of a score over the held-out views, or over the others.
 fn mean(scored: &[Scored], held_out: bool, score: impl Fn(&Scored) -> Option<f64>) -> Option<f64> {
     let of: Vec<f64> =
         scored.iter().filter(|one| one.held_out == held_out).filter_map(score).collect();
     (!of.is_empty()).then(|| of.iter().sum::<f64>() / of.len() as f64)
 }
 
-/// Scores of a mesh, and where it is written.
+/// Scores of a mesh, and its path.
 struct Summary {
     train: f64,
     held_out: Option<f64>,
-    /// In decibels, of the same two parts.
+    /// In decibels, of the training and held-out views.
     psnr: [Option<f64>; 2],
     /// The same of the colours of vertices.
     psnr_of_vertices: [Option<f64>; 2],
@@ -80,7 +80,7 @@ struct Summary {
     seconds: f64,
 }
 
-/// Pictures of the views that are shown, in their order, and the sheets of them as PNG.
+/// Pictures of the shown views, in their order, and contact sheets of them as PNG.
 struct Pictures {
     overlays: Vec<RgbImage>,
     pairs: Vec<[RgbImage; 2]>,
@@ -186,7 +186,7 @@ fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
     scores.chain(rest).chain(glb).chain([seconds]).collect()
 }
 
-/// Whether the mesh fits, in a sentence or two.
+/// Verdict on the fit of the mesh, in a sentence or two.
 fn verdict(mesh: &Mesh, summary: &Summary) -> String {
     let Summary { train, held_out, psnr, seconds, .. } = summary;
     let aside = held_out.map_or_else(String::new, |iou| format!(", {iou:.4} in views held out"));
@@ -216,7 +216,7 @@ fn page(
     let mut page = Report::new("shape3d", about);
     page.verdict(&verdict(mesh, summary));
     page.warnings(warnings);
-    // A page keeps coordinates in 32 bits.
+    // A page stores coordinates in 32 bits.
     let frame = Frame::of_mesh(mesh);
     let views = scored.iter().map(|one| {
         seen_by(
@@ -271,7 +271,7 @@ fn page(
     Ok(page)
 }
 
-/// Held-out views first, as their pictures.
+/// Table of the scores, with held-out views first, like the pictures.
 fn table(scored: &[Scored], in_colour: bool) -> Table {
     let any_held_out = scored.iter().any(|one| one.held_out);
     let head = ["view", "IoU"].into_iter().chain(in_colour.then_some("PSNR in dB"));
@@ -317,7 +317,7 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
     json
 }
 
-/// Views held out, then others evenly spaced.
+/// Held-out views, then others evenly spaced, at most [`SHOWN`].
 fn shown(scored: &[Scored]) -> impl Iterator<Item = &Scored> {
     let aside = scored.iter().filter(|one| one.held_out);
     let train: Vec<&Scored> = scored.iter().filter(|one| !one.held_out).collect();

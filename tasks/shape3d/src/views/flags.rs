@@ -8,12 +8,13 @@ use softrast_lab::parse::positive;
 /// Pictures and the cameras that took them.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Views {
-    /// Folder with pictures and their cameras: transforms.json (instant-ngp, nerfstudio), a model of COLMAP (also in sparse/0 or colmap), or `transforms_train.json`. Masks are transparency, files that it names, or those of --masks
+    /// Folder with pictures and their cameras: transforms.json (instant-ngp, nerfstudio), a model of COLMAP (also in sparse/0 or colmap),
+    /// or `transforms_train.json`. Masks are transparency, files that it names, or those of --masks
     #[arg(long, value_name = "DIR")]
     pub views: Option<PathBuf>,
 
-    /// Views on which the result is scored, and which the search does not see: a number of those in the folder, evenly spaced, or another file of cameras in
-    /// the same world, such as `transforms_test.json`
+    /// Held-out views, on which the result is scored: a number of those in the folder, evenly spaced, or another file of cameras in the
+    /// same world, such as `transforms_test.json`
     #[arg(long, value_name = "N|FILE", requires = "views")]
     pub hold_out: Option<HoldOut>,
 
@@ -21,7 +22,8 @@ pub struct Views {
     #[arg(long, value_enum, requires = "views", conflicts_with = "template")]
     pub start: Option<Begin>,
 
-    /// Let the colours of the pictures pull the shape too, and give them to the mesh. With --mesh the shape is known, in the world units of the cameras, and stays
+    /// Fit the shape to the colours of the pictures too, and give them to the mesh. With --mesh the shape is known, in the world units of
+    /// the cameras, and stays
     #[arg(long)]
     pub colour: bool,
 
@@ -34,15 +36,15 @@ pub struct Views {
     #[arg(long, value_name = "DIR", requires = "views", num_args = 0..=1, conflicts_with_all = ["mesh", "template"])]
     pub normals: Option<Option<PathBuf>>,
 
-    /// Faces at most [default: as many as the pixels show, up to 200000]
+    /// Largest number of faces [default: as many as the pixels resolve, up to 200000]
     #[arg(long, value_name = "N", requires = "views", conflicts_with = "template", value_parser = clap::value_parser!(u32).range(100..=2_000_000))]
     pub faces: Option<u32>,
 
-    /// How smooth the surface is kept, against the usual, at most 5
+    /// Smoothing of the surface relative to the usual, at most 5
     #[arg(long, value_name = "FACTOR", requires = "views", value_parser = smoothness, allow_negative_numbers = true)]
     pub smooth: Option<f64>,
 
-    /// How pictures become masks.
+    /// Conversion of pictures to masks.
     #[command(flatten)]
     pub masks: MaskFlags,
 }
@@ -54,7 +56,7 @@ fn smoothness(text: &str) -> Result<f64, String> {
     })
 }
 
-/// Views on which a result is scored, and which the search does not see.
+/// Held-out views, on which a result is scored.
 #[derive(Clone, Debug)]
 pub enum HoldOut {
     /// This many of the folder's views, evenly spaced.
@@ -75,9 +77,9 @@ impl From<OsString> for HoldOut {
 /// Start of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Begin {
-    /// All that no mask rules out.
+    /// The space that no mask excludes.
     #[default]
     Hull,
-    /// A sphere around it.
+    /// A sphere around the object.
     Sphere,
 }

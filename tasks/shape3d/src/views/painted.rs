@@ -11,13 +11,13 @@ use softrast_views::{PaintedView, coloured_pixels};
 use super::textured::Textured;
 use crate::Args;
 
-/// On spot with its shape known, 30 steps at 0.1 end at 31.4 dB on views kept aside, 40 at 0.05 at 32.6, 60 at 34.3.
+/// On spot with its shape known, 30 steps at 0.1 end at 31.4 dB on held-out views, 40 at 0.05 at 32.6, 60 at 34.3.
 const STEPS: usize = 60;
 const LEARNING_RATE: f64 = 0.05;
 /// Pixels a side. With 192 instead of 128 spot gains 0.1 dB.
 const SIZE: usize = 128;
 
-/// What a view shows in colour, and the result from there.
+/// A view in colour, and the result from there.
 pub(super) struct Colours {
     /// In decibels: of the texture, or else of the colours of vertices.
     pub(super) psnr: Option<f64>,

@@ -11,23 +11,23 @@ use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
 use softrast_views::View;
 
-/// Weights of the bending of the surface, for each vertex: Laplacian and flatness. As the task has them for its 642 vertices, and a
-/// seventh of that: on spot from 20 views, the mean `IoU` on 4 others is 0.981 with a tenth, 0.979 with a third, 0.976 with all. Spot is
-/// the one mesh that these were chosen on.
+/// Weights of the bending of the surface, per vertex: Laplacian and flatness. They are a seventh of the task's for its 642 vertices: on
+/// spot from 20 views, the mean `IoU` on 4 others is 0.981 with a tenth, 0.979 with a third, 0.976 with all. Spot is the only mesh used for
+/// this choice.
 const LAPLACIAN: f64 = 0.03 / 642.0 / 7.0;
 const FLATNESS: f64 = 0.0003 / 642.0 / 7.0;
 
-/// A mesh that is deformed until it has the silhouettes of some masks.
+/// A mesh that is deformed until its silhouettes match some masks.
 ///
-/// θ is how far each vertex has moved from the start, in half the longest side of that, `[3 V]`. The loss is the soft `IoU` loss over
-/// what is looked at of each view, mean over the views, and what keeps the surface smooth.
+/// θ is the displacement of each vertex from the start, in units of half the longest side of the start, `[3 V]`. The loss is the soft `IoU`
+/// loss over the drawn square of each view, averaged over the views, plus the smoothness terms.
 pub(super) struct FromViews {
     start: Mesh,
     faces: Arc<[[u32; 3]]>,
     reach: f64,
     views: Arc<[View]>,
     squares: Vec<[f64; 3]>,
-    /// How smooth, against the usual.
+    /// Smoothing relative to the usual.
     pub(super) smooth: f64,
 }
 

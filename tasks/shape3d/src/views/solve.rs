@@ -21,7 +21,7 @@ use super::{
 };
 use crate::Args;
 
-/// The mesh that has the silhouettes of a folder's masks, if the flags name one.
+/// The mesh fitted to the masks of a folder, if the flags name one.
 pub(crate) fn solve_views(
     given: &Given<'_, Args>,
     flags: &Views,
@@ -91,7 +91,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let note = cameras.note().map(str::to_owned);
     let notes = note.into_iter().chain(loaded().flat_map(|views| reading_notes(views)));
     let notes: Vec<String> = notes.collect();
-    // What is wrong with a picture is said before the work.
+    // Faults of pictures are reported before the work.
     let paint = |views: &[View]| {
         let painted = views.iter().filter(|_| flags.colour).map(PaintedView::load);
         painted.collect::<anyhow::Result<Vec<_>>>()
@@ -112,7 +112,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         (None, Some(_)) => template::steps(given),
         (None, None) => surface::steps(given),
     };
-    // A surface that is looked for brings its colours.
+    // A fitted surface already has its colours.
     let paints = flags.colour && (args.mesh.is_some() || args.template.is_some());
     let of_colours = if paints { painted::config(given).steps } else { 0 };
     let of_texture = if flags.colour { textured::STEPS } else { 0 };
@@ -179,7 +179,7 @@ fn of_normals(views: &[View], folder: Option<&Path>) -> anyhow::Result<Vec<View>
     views.iter().map(of).collect()
 }
 
-/// Views to work with, and so many evenly spaced ones that are kept aside.
+/// Training views, and `hold_out` evenly spaced held-out ones.
 fn split_held_out(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>; 2]> {
     let count = all.len();
     ensure!(

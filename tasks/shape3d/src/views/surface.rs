@@ -1,4 +1,4 @@
-//! The surface that views show, from their hull or from a sphere.
+//! A surface fitted to views, from their hull or from a sphere.
 
 use anyhow::anyhow;
 use softrast_cli::Given;
@@ -10,15 +10,16 @@ use softrast_views::{PaintedView, View};
 use super::flags::{Begin, Views};
 use crate::Args;
 
-/// Steps that move the surface.
+/// Default number of steps.
 const STEPS: usize = 500;
 
-/// How many steps are taken.
+/// Number of steps.
 pub(super) fn steps(given: &Given<'_, Args>) -> usize {
     given.common.steps.unwrap_or(STEPS)
 }
 
-/// The surface, of views of a frame; `shown` are their colours and their normals, each of all views or of none. Where the user stops it, it is as it was then.
+/// The surface fitted to views in a frame, with the colours and the normals of all views or of none. If the user stops the fit, the surface
+/// is that of the last step.
 pub(super) fn found(
     given: &Given<'_, Args>,
     flags: &Views,

@@ -1,4 +1,4 @@
-//! A mesh of the user's that is deformed and keeps its faces.
+//! A mesh of the user that is deformed without remeshing; one stage subdivides its faces.
 
 use std::sync::Arc;
 
@@ -13,45 +13,45 @@ use softrast_views::View;
 use super::problem::FromViews;
 use crate::Args;
 
-/// A part of the work.
+/// A stage of the deformation.
 #[derive(Clone, Copy)]
 struct Stage {
     steps: usize,
     /// Pixels a side.
     size: usize,
     learning_rate: f64,
-    /// Whether the softness is so narrow that small faces do not widen the outline, or what was learned for spheres.
+    /// Whether the softness is so narrow that small faces do not widen the outline, or the one learned for spheres.
     narrow: bool,
     /// Whether the mesh has four times as many faces as before.
     finer: bool,
 }
 
-/// From the template to the shape.
+/// Stages from the template to the shape.
 const STAGES: [Stage; 3] = [
     Stage { steps: 80, size: 64, learning_rate: 0.01, narrow: false, finer: false },
     Stage { steps: 60, size: 128, learning_rate: 0.004, narrow: false, finer: true },
     Stage { steps: 60, size: 128, learning_rate: 0.003, narrow: true, finer: false },
 ];
-/// Scale of a logistic that is narrow, in NDC of what is looked at. On spot from 20 views the mean `IoU` on 4 others was 0.981 with it,
-/// 0.979 with half, 0.976 with one and a half and 0.962 with what was learned for spheres. Spot is the one mesh that it was chosen on.
+/// Scale of the narrow logistic, in NDC of the drawn square. On spot from 20 views the mean `IoU` on 4 others was 0.981 with it, 0.979 with
+/// half, 0.976 with one and a half and 0.962 with the softness learned for spheres. Spot is the only mesh used for this choice.
 const NARROW: f64 = 0.001;
-/// A mean `IoU` from which a finer mesh is not worth its time.
+/// Mean `IoU` from which on further stages are not worth their time.
 const RESTART_ABOVE: f64 = 0.995;
-/// Half the longest side of the template at the start, in half the extent of the object.
+/// Half the longest side of the template at the start, in units of half the extent of the object.
 const SIZE: f64 = 0.7;
 
-/// How many steps are taken at most.
+/// Largest number of steps.
 pub(super) fn steps(given: &Given<'_, Args>) -> usize {
     stages(given).iter().map(|stage| stage.steps).sum()
 }
 
-/// Parts of the work, with the steps that were asked for.
+/// The stages, with the requested steps.
 fn stages(given: &Given<'_, Args>) -> Vec<Stage> {
     let steps = given.common.steps;
     STAGES.map(|stage| Stage { steps: steps.unwrap_or(stage.steps), ..stage }).to_vec()
 }
 
-/// The template after all stages, for views of a frame: of each the best by its hard images.
+/// The template after all stages, for views in a frame: the best step of each stage by hard loss.
 pub(super) fn deformed(
     given: &Given<'_, Args>,
     (template, smooth): (Mesh, f64),
