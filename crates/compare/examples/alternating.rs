@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example alternating              # as many seeds as in docs/results.md
-//! cargo run --release -p compare --features studies --example alternating -- --quick   # two seeds of tiny instances, to out/alternating.md
+//! cargo run --release -p compare --features studies --example alternating -- --quick   # two tiny seeds, to out/alternating.md
 //! ```
 //!
 //! The strongest baseline without learning: φ descends the inner loss together with the scene, starting from the searched fixed width, at a

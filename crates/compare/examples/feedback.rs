@@ -23,7 +23,7 @@ use softrast_lab::{
 };
 use softrast_raster::HostBackend as B;
 
-/// A run fails if it returns a larger error, and finds its pose if it returns less than a third of this.
+/// A run fails if its returned error is above this, and finds its pose if the error is below a third of this.
 const FAILED: f64 = 0.05;
 /// Number of times in the chart over seconds.
 const TIMES: usize = 60;

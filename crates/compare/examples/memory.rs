@@ -1,4 +1,4 @@
-//! Peak memory of a meta-gradient through 3D SHAPE, and how it grows.
+//! Peak memory of a meta-gradient through 3D SHAPE, and its growth.
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example memory              # 10, 30 and 100 steps, other spheres and sizes

@@ -176,7 +176,7 @@ impl Args {
 
     /// Adds the cells of the methods as given, and varied.
     ///
-    /// A learned or searched softness is omitted where it is the preset, if the preset is compared.
+    /// A learned or searched softness is omitted if it is the preset and the preset is compared.
     fn compared(
         &self,
         task: &'static dyn AnyTask,

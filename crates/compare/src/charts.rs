@@ -153,8 +153,8 @@ impl Price {
         [self.seconds, mean(&self.errors)]
     }
 
-    /// Whether it is no worse in both and significantly better in one: in seconds by [`SCATTER`], or in the error beyond the 95 % interval
-    /// of the differences.
+    /// Whether this method is no worse in seconds and error, and significantly better in one: by [`SCATTER`] of the seconds, or beyond the
+    /// 95 % interval of the error differences.
     fn beats(&self, other: &Self) -> bool {
         let ([seconds, error], [others, others_error]) = (self.point(), other.point());
         let faster = seconds <= (1.0 - SCATTER) * others;

@@ -25,7 +25,7 @@ pub trait AnyTask: Sync {
     /// Name in the paper.
     fn title(&self) -> &'static str;
 
-    /// Whether edges move. Only then can its images be drawn on fewer pixels and less exactly, and is a surrogate useful.
+    /// Whether edges move. Only then can images be drawn on fewer pixels or less exactly, and only then is a surrogate useful.
     fn moves_edges(&self) -> bool;
 
     /// The paper's data on the task.

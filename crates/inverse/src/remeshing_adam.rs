@@ -11,13 +11,13 @@ const RATE: f64 = 0.3;
 const SMOOTHED: (usize, f32) = (2, 0.5);
 /// Fraction of the way to the mean of its neighbours that a vertex moves along the surface after each step, which keeps triangles even.
 const ALONG: f32 = 0.3;
-/// Fraction of that way across the surface at the usual rate; it is proportional to the rate. At a quarter of it the surface folds.
+/// Fraction of that way across the surface at the usual rate, proportional to the rate. At a quarter of this value the surface folds.
 const ACROSS: f32 = 0.02;
 /// Steps from one remeshing to the next.
 const EVERY: usize = 3;
 /// Factor of the edge length at the largest number of faces, because not all faces are equilateral.
 const ROOM: f64 = 1.2;
-/// Least squared length of a gradient, so that a vertex without gradient stays.
+/// Least squared length of a gradient, so that a vertex without gradient does not move.
 const LEAST: f32 = 1e-24;
 /// Columns of optimiser state per vertex: mean gradient, and the mean of its squared length.
 const STATE: usize = 4;
@@ -202,8 +202,8 @@ impl RemeshingAdam {
         self.surface.columns::<CHANNELS>(COLOURS)
     }
 
-    /// [`Self::step`] against gradients with respect to the vertices and, if present, to colours, `[vertices, 3]` each. Colours stay in [0,
-    /// 1].
+    /// [`Self::step`] against gradients with respect to the vertices and, if present, the colours, `[vertices, 3]` each. Colours stay
+    /// between 0 and 1.
     pub(crate) fn step_by(&mut self, mut gradient: Vec<f32>, colours: Option<Vec<f32>>) {
         for _ in 0..SMOOTHED.0 {
             let away = self.geometry.umbrella(&gradient);

@@ -60,7 +60,7 @@ impl Trial {
         Self::at_most(f64::from(u8::from(!yes)), 0.5)
     }
 
-    /// This trial, neither finite nor reached unless all of these numbers are finite too.
+    /// This trial, counted as finite and reached only if all of these numbers are finite too.
     #[must_use]
     pub fn with(mut self, numbers: &[f64]) -> Self {
         self.finite &= numbers.iter().all(|x| x.is_finite());

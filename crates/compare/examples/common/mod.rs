@@ -58,7 +58,7 @@ pub(crate) fn constant(family: Family) -> MethodArgs {
     }
 }
 
-/// A task, its method, and how it is solved.
+/// A task, its method and its settings.
 pub(crate) fn setup<T: Task>(
     args: &T::Args,
     common: &Common,

@@ -1,4 +1,4 @@
-//! The loss of images against targets, and its gradient to the images.
+//! The loss of images against targets, and its gradient with respect to the images.
 
 use rayon::prelude::*;
 
@@ -23,8 +23,8 @@ pub(super) fn judge_mask(target: &Target, coverage: &[f32], to_coverage: &mut [f
     to_coverage.par_chunks_mut(AT_ONCE).enumerate().map(of).sum()
 }
 
-/// Sum of the absolute differences of three drawn channels and the known ones. Adds its gradients with respect to the channels, `[3,
-/// pixels]`, and to coverage.
+/// Sum of the absolute differences of three drawn channels and the known ones. Adds its gradients with respect to channels, `[3, pixels]`,
+/// and coverage.
 ///
 /// A channel c contributes `a c` at coverage a. Where pixels of the target count in full or not at all, the outline is unknown: `p a c` is
 /// compared with `a` times the known value, p being the fraction that counts, and coverage gets no gradient.

@@ -150,8 +150,8 @@ impl ClosedSurface {
     /// One pass over all edges: collapses those below four fifths of their target length, the mean of both ends; splits those above four
     /// thirds, while there are at most `most` faces; flips those for which the valences of the four adjacent vertices come closer to six.
     ///
-    /// The surface stays closed and of its genus. No change turns a face by more than 60 degrees, makes a needle of it, or makes two edges between the same
-    /// vertices.
+    /// The surface stays closed and of its genus. No change turns a face by more than 60 degrees, makes a needle of it, or makes two edges
+    /// between the same vertices.
     pub fn remesh(&mut self, most: usize) -> Changes {
         let Self { edges, numbers, width } = self;
         let changes = Changes {

@@ -21,7 +21,7 @@ fn faces_at_almost_one_depth_change_places_smoothly() {
     hold_every_depth(ties);
 }
 
-/// F12: far from all faces the background is seen.
+/// F12: only the background is visible far from all faces.
 #[test]
 fn far_from_all_faces_is_the_background() {
     hold_every_depth(far);
@@ -38,7 +38,7 @@ fn hold_every_depth(promise: impl Fn(DepthSoftness) -> Vec<Level>) {
     }
 }
 
-/// O24: equal colours, equal places, equal depths at the start.
+/// O24: equal colours, positions and depths at the start.
 #[test]
 fn an_order_that_no_image_shows_keeps_depths_within_their_room() {
     let problem = Problem::ORIGINAL;

@@ -22,8 +22,8 @@ pub struct Views {
     #[arg(long, value_enum, requires = "views", conflicts_with = "template")]
     pub start: Option<Begin>,
 
-    /// Fit the shape to the colours of the pictures too, and give them to the mesh. With --mesh the shape is known, in the world units of
-    /// the cameras, and stays
+    /// Fit the shape to the colours of the pictures too, and give them to the mesh. With --mesh the shape is given, in the world units of
+    /// the cameras, and fixed
     #[arg(long)]
     pub colour: bool,
 
