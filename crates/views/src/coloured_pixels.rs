@@ -86,7 +86,7 @@ fn shown_pixels(
 /// assert!((depth - 3.0).abs() < 0.05 && face.is_some());
 /// assert_eq!(samples[0], (f64::INFINITY, None));
 /// ```
-pub fn nearest_samples<T: Copy + Send>(
+pub fn nearest_samples<T: Copy + Send + Sync>(
     mesh: &Mesh,
     camera: &Pinhole,
     each: usize,
