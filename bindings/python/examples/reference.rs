@@ -1,4 +1,4 @@
-//! What the Python tests compare with, computed in Rust alone: `cargo run --release --example reference > reference.txt`.
+//! Reference numbers of the Python tests, computed in Rust alone: `cargo run --release --example reference > reference.txt`.
 //!
 //! A line has a name and the bits of its numbers, in hexadecimal.
 
@@ -76,7 +76,7 @@ fn silhouettes() {
     }
 }
 
-/// The same in colours.
+/// Numbers of an image in colours.
 fn colours() {
     let mesh = softrast_mesh::icosphere(1);
     let renderer = ColourRenderer::new(mesh.faces(), SIZE, Family::Logistic, 0.05, [1.5, 3.5]);

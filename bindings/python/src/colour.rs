@@ -13,7 +13,7 @@ use crate::{
     softness::Softness,
 };
 
-/// What an image in colours depends on beside vertices, attributes, background and φ.
+/// A renderer of images in colours: everything except vertices, attributes, background and φ.
 #[pyclass(frozen, module = "softrast._native")]
 pub(crate) struct ColourRenderer {
     renderer: softrast_raster::ColourRenderer,
@@ -165,7 +165,7 @@ impl ColourRenderer {
     }
 }
 
-/// What draws colours under some φ, with knots for it.
+/// A renderer of colours for one φ, with knots for it.
 #[pyclass(frozen, module = "softrast._native")]
 pub(crate) struct PreparedColour {
     blend: Op,

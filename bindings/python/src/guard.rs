@@ -53,7 +53,7 @@ fn own_threads() -> Result<Option<Arc<ThreadPool>>, String> {
     }
     let threads = ThreadPoolBuilder::new().build().map_err(|error| error.to_string())?;
     let threads = Arc::new(threads);
-    // Those of a process before this one are not ended, which would wait for them too.
+    // Threads of the process before a fork are leaked: to end them would wait for them.
     std::mem::forget(forked.replace((id, threads.clone())));
     Ok(Some(threads))
 }

@@ -40,7 +40,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        // What panics becomes an error with the same message; this hook is of this library alone.
+        // A panic becomes an error with the same message; the hook belongs to this library alone.
         std::panic::set_hook(Box::new(|_| {}));
         guard::remember_process();
         module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -295,7 +295,7 @@ impl Kind {
         })
     }
 
-    /// What is wrong with the shapes of a call.
+    /// Checks the shapes of a call.
     fn check(&self, pass: &Pass, dims: &[Vec<usize>], directions: &[usize]) -> Result<(), String> {
         let (inputs, upstream) = dims.split_at(self.inputs().min(dims.len()));
         let wrong = || format!("arrays of these shapes do not fit the op: {dims:?}");

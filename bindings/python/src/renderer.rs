@@ -16,7 +16,7 @@ use crate::{
     softness::Softness,
 };
 
-/// What an image depends on beside vertices and φ; it chooses supports and knots.
+/// A renderer of silhouettes: everything except vertices and φ. It chooses supports and knots.
 #[pyclass(frozen, module = "softrast._native")]
 pub(crate) struct Renderer {
     renderer: SoftRenderer<EdgeSoftness>,
@@ -26,7 +26,7 @@ pub(crate) struct Renderer {
     size: [usize; 2],
 }
 
-/// What draws under some φ, with support and knots for it.
+/// A renderer for one φ, with support and knots for it.
 #[pyclass(frozen, module = "softrast._native")]
 pub(crate) struct Prepared {
     silhouette: Silhouette<EdgeSoftness>,

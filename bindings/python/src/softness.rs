@@ -37,7 +37,7 @@ impl Softness {
         guarded(py, || Self(ScheduledSoftness::constant(softness, scale)))
     }
 
-    /// What was learned on a task and comes along; `learned_names()` lists them.
+    /// A bundled softness that was learned on a task; `learned_names()` lists them.
     #[staticmethod]
     fn learned(name: &str) -> PyResult<Self> {
         ScheduledSoftness::learned(name).map(Self).map_err(refused)
@@ -66,7 +66,7 @@ impl Softness {
         ScheduledSoftness::parse(text, PICKLE).map(Self).map_err(refused)
     }
 
-    /// The same softness with other parameters, `[P]`, without a schedule and without a surrogate.
+    /// This softness with other parameters, `[P]`, without a schedule and without a surrogate.
     fn with_phi(&self, phi: Vec<f64>) -> PyResult<Self> {
         let softness = self.0.softness;
         check_phi("phi", softness.family.name(), softness.parameters(), &phi)?;

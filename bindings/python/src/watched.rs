@@ -46,7 +46,7 @@ impl Watch {
 ///
 /// # Errors
 ///
-/// Those of `visit` and of the work, and KeyboardInterrupt where there is no step yet whose result could be returned.
+/// Errors of `visit` and of the work, and KeyboardInterrupt before the first step whose result could be returned.
 pub(crate) fn watched<T: Send + 'static>(
     py: Python<'_>,
     visit: Option<Py<PyAny>>,

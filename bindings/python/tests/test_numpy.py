@@ -1,4 +1,4 @@
-"""What needs NumPy alone."""
+"""Functions that need NumPy alone."""
 
 import os
 import signal

@@ -103,7 +103,7 @@ sys.exit(1 if found.complete or found.iou < 0.3 or found.alternatives else 8)
 
 
 def test_ctrl_c_before_the_first_step_ends_a_search():
-    # What comes before the first step of this mesh takes seconds.
+    # The preparation of this mesh, before its first step, takes seconds.
     code, seconds = ended("None", "mesh = softrast.icosphere(8); print('ready', flush=True)")
     assert code == 7 and seconds < 1.0
 

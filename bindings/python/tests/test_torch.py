@@ -74,7 +74,7 @@ def test_the_gradient_of_a_surrogate_is_that_of_the_wider_softness():
     image = st.silhouette(draw, seen)
     assert np.array_equal(image.detach().numpy(), softrast.silhouette(draw, seen.detach().numpy()))
     (gradient,) = torch.autograd.grad((image * weights).sum(), seen, create_graph=True)
-    # What the coverage makes of the sums is the image's own; how the sums move is the surrogate's.
+    # The image's own softness maps sums to coverage; the surrogate's gives the derivative of the sums.
     table, upstream = felt.table().forward([felt_phi]), ((1.0 - image) * weights).detach().numpy()
     scene = [np.ascontiguousarray(seen.detach().numpy().swapaxes(1, 2)), table]
     expected = torch.from_numpy(felt.sum().vjp(scene, upstream, [True, False]).reshape(scene[0].shape)).transpose(1, 2)

@@ -117,7 +117,7 @@ def test_few_faces_and_a_start_are_kept_to():
 def test_colours_come_with_the_surface():
     found = softrast.fit_mesh(ball_views(), colours=True, steps=120)
     assert found.colours.shape == found.positions.shape and found.iou.mean() > 0.95 and found.psnr.mean() > 20.0
-    # Those of the ball, at the nearest of its vertices.
+    # Normals of the ball, at the nearest of its vertices.
     positions, _, colours = ball()
     nearest = ((found.positions[:, None] - positions) ** 2).sum(2).argmin(1)
     assert np.abs(found.colours - colours[nearest]).mean() < 0.12

@@ -133,7 +133,7 @@ def _value_jvp(inputs, directions, *, of):
     if not any(_moves(directions)):
         return found, _still(found)
     moved = _JVP.bind(*inputs, *found[1:], *_given(directions), of=of, along=_moves(directions))
-    # What is kept is a function of the inputs: they have its share.
+    # A cached value is a function of the inputs, so they get its share of the gradient.
     return found, [*moved, *_still(found[1:])]
 
 
