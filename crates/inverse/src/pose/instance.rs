@@ -1,4 +1,5 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
+use softrast_mesh::Mesh;
 use softrast_raster::Orbit;
 
 /// Target and start of one run.
@@ -65,6 +66,27 @@ impl PoseInstance {
 fn normal(random: &mut StdRng) -> f64 {
     let [u, v] = [(); 2].map(|()| random.random::<f64>());
     (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}
+
+/// Finds the orbit camera of a mesh from its target silhouette.
+///
+/// θ is distance, elevation and azimuth of each instance, as in [`PoseScene`](super::PoseScene). The loss is the soft
+/// `IoU` loss against the hard silhouette at the target.
+#[derive(Clone, Debug)]
+pub struct PoseProblem {
+    /// The mesh, in world units.
+    pub mesh: Mesh,
+    /// Least and largest angle between a start and its target, in degrees.
+    pub range_deg: [f64; 2],
+    /// Whether the field of view is optimised too, from a random start, instead of known.
+    pub optimise_fov: bool,
+}
+
+impl PoseProblem {
+    /// The poses of a mesh around the origin, from starts 35 to 55 degrees away, with known field of view.
+    pub fn new(mesh: &Mesh) -> Self {
+        Self { mesh: mesh.clone(), range_deg: [35.0, 55.0], optimise_fov: false }
+    }
 }
 
 #[cfg(test)]

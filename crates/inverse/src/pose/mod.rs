@@ -21,10 +21,9 @@ mod vertex_colours;
 
 pub use coloured::{ColouredViews, split_coverage};
 pub use found::FoundPose;
-pub use instance::PoseInstance;
+pub use instance::{PoseInstance, PoseProblem};
 pub use masks::{MaskPose, MaskPoses, MaskScene};
 pub use pose_search::PoseSearch;
-pub use problem::PoseProblem;
 pub use scene::{PoseScene, nearest_distance};
 pub use symmetry::{Symmetry, symmetries};
 pub use vertex_colours::VertexColours;

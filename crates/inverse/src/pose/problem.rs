@@ -1,33 +1,11 @@
 use std::sync::Arc;
 
-use softrast_mesh::Mesh;
 use softrast_raster::RasterBackend;
 use softrast_softness::Softness;
 use softrast_tensor::Tensor;
 
-use super::{PoseInstance, PoseScene};
+use super::{PoseInstance, PoseProblem, PoseScene};
 use crate::{InverseProblem, SoftnessAt, SolveConfig};
-
-/// Finds the orbit camera of a mesh from its target silhouette.
-///
-/// θ is distance, elevation and azimuth of each instance, as in [`PoseScene`]. The loss is the soft
-/// `IoU` loss against the hard silhouette at the target.
-#[derive(Clone, Debug)]
-pub struct PoseProblem {
-    /// The mesh, in world units.
-    pub mesh: Mesh,
-    /// Least and largest angle between a start and its target, in degrees.
-    pub range_deg: [f64; 2],
-    /// Whether the field of view is optimised too, from a random start, instead of known.
-    pub optimise_fov: bool,
-}
-
-impl PoseProblem {
-    /// The poses of a mesh around the origin, from starts 35 to 55 degrees away, with known field of view.
-    pub fn new(mesh: &Mesh) -> Self {
-        Self { mesh: mesh.clone(), range_deg: [35.0, 55.0], optimise_fov: false }
-    }
-}
 
 impl InverseProblem for PoseProblem {
     type Instance = PoseInstance;
