@@ -85,6 +85,7 @@ pub fn paint_until_stopped(
 
     let start = tensor(mean.map(|channel| vec![channel; count]).concat(), [3 * count]);
     let inner = InnerLoop { optimizer: Adam::new(learning_rate), steps };
+    let mut last = None;
     let gradient = |step: usize, theta: &Tensor<HostBackend, 1>| {
         let leaf = Tensor::<B, 1>::from_inner(theta.clone()).require_grad();
         let colours: Tensor<B, 2> = leaf.clone().reshape([3, count]);
@@ -92,14 +93,18 @@ pub fn paint_until_stopped(
         let attributes = Attributes::new(colours.clone(), faces.clone());
         let image = renderer.image(Projected::from_inner(seen.clone()), &attributes, &background);
         let off = targets.loss(image);
-        visit(step, numbers(off.clone().inner())[0]).map_err(|why| (theta.clone(), why))?;
+        if let Err(why) = visit(step, numbers(off.clone().inner())[0]) {
+            last = Some(theta.clone());
+            return Err(why);
+        }
         let loss = off + surface.laplacian(colours) * (SMOOTH / count as f64);
         Ok(leaf.grad(&loss.backward()).unwrap_or_else(|| theta.zeros_like()))
     };
     let found = descend(&inner, start, gradient, |theta| theta.clamp(0.0, 1.0), |_, _, _| ());
-    let (theta, stopped) = match found {
-        Ok(theta) => (theta, None),
-        Err((theta, why)) => (theta, Some(why)),
+    let (theta, stopped) = match (found, last) {
+        (Ok(theta), _) => (theta, None),
+        (Err(why), Some(theta)) => (theta, Some(why)),
+        (Err(why), None) => return Err(why),
     };
     let found = numbers(theta);
     let colours = (0..count).map(|v| [0, 1, 2].map(|k| found[k * count + v])).collect();
