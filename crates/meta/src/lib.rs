@@ -23,7 +23,7 @@
 //! let inner = InnerLoop { optimizer: Sgd { learning_rate: 0.25 }, steps: 4 };
 //! let theta = inner.solve(&Parabola, vector::<Outer>(&[0.0]), &phi);
 //! let by_phi = phi.grad(&theta.backward()).unwrap().into_scalar();
-//! Each step halves the distance to φ.
+//! // Each step halves the distance to φ.
 //! assert!((by_phi - (1.0 - 0.5_f32.powi(4))).abs() < 1e-6);
 //! ```
 
