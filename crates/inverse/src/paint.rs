@@ -130,7 +130,7 @@ fn cut(mut mesh: Mesh, pixels: f64) -> Mesh {
     mesh
 }
 
-/// What draws a mesh whose vertices have these depths in all views.
+/// The renderer for a mesh with these vertex depths over all views.
 fn renderer(
     mesh: &Mesh,
     faces: &Arc<[[u32; 3]]>,

@@ -27,7 +27,7 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
     })
 }
 
-/// The same of a mesh with this atlas, whose colour between the texels each sample shows.
+/// Renders a mesh with this atlas, as [`coloured_pixels`] does: a sample has the colour between its texels.
 ///
 /// # Panics
 ///
@@ -40,7 +40,7 @@ pub fn textured_pixels(mesh: &Mesh, atlas: &Atlas, camera: &Pinhole) -> [Vec<f64
     })
 }
 
-/// The same, of what faces show at these weights of their corners.
+/// Renders faces whose colour is a function of their number and of the weights of their corners.
 fn shown_pixels(
     mesh: &Mesh,
     camera: &Pinhole,

@@ -1,4 +1,4 @@
-//! What views read of texels.
+//! Texels as views read them.
 
 use anyhow::ensure;
 use rayon::prelude::*;
@@ -8,7 +8,7 @@ use softrast_raster::Pinhole;
 use crate::{PaintedView, Unwrapped, nearest_samples};
 
 /// Pixels of the squares of all views at most, and of samples four times as many: larger squares are reduced.
-const MOST_PIXELS: f64 = (1u64 << 25) as f64;
+const MOST_PIXELS: f64 = (1u64 << 23) as f64;
 /// Samples along each side of a pixel.
 const EACH: usize = 2;
 /// The square of a view is this much larger than its mask.
@@ -32,9 +32,9 @@ struct Sample {
 #[derive(Debug)]
 struct Pixel {
     samples: u8,
-    /// What is drawn is the sum of the samples times this.
+    /// Factor of the sum of the samples.
     weight: f32,
-    /// What is known, times the square root of how much it counts.
+    /// Known colour, times the square root of its weight.
     known: [f32; 3],
 }
 
@@ -45,7 +45,7 @@ struct Seen {
     samples: Vec<Sample>,
 }
 
-/// What views read of a texture, and what they should: the square of each view around its mask, as many pixels as the picture has there.
+/// Texels that views read, and the colours that they should read: the square of each view around its mask, as many pixels as the picture has there.
 ///
 /// It is linear in the texels: a pixel is the mean of 2 × 2 samples, and each sample a mean of four texels of the nearest face. A [`ColourRenderer`](softrast_raster::ColourRenderer) with narrow softnesses reads the same of
 /// [`Attributes::with_texture`](softrast_raster::Attributes::with_texture), from a mesh that may move; here the mesh stays, so where a view reads is found once.
@@ -65,7 +65,7 @@ pub struct TexelPull {
 }
 
 impl TexelReads {
-    /// What views see of a mesh, in any unit: at each sample the nearest face. A pixel counts as much as the view says, times the cosine between the surface
+    /// Reads of the nearest face at each sample of each view, of a mesh in any unit. A pixel counts as much as the view says, times the cosine between the surface
     /// and the direction to the camera to the power of `facing`.
     ///
     /// # Errors

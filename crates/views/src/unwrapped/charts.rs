@@ -180,7 +180,7 @@ fn without_overlap(
             }
         }
     }
-    // What was not reached is beyond an overlap.
+    // Faces that were not reached lie beyond an overlap.
     other.extend(faces.iter().filter(|face| waits[face]));
     (kept, other)
 }

@@ -9,7 +9,7 @@ use super::charts::{Chart, charts};
 const MARGIN: f64 = 3.0;
 /// The part of a square that charts cover at first; each try covers less, until all have room.
 const COVERED: f64 = 0.9;
-/// What a try makes of texels for each world unit.
+/// Factor of the texels for each world unit from one try to the next.
 const SMALLER: f64 = 0.96;
 /// Tries, the last with a hundredth of the texels for each world unit.
 const TRIES: i32 = 113;
@@ -88,7 +88,7 @@ impl Unwrapped {
 /// The outline of a chart: what it covers of each column of texels, margins included.
 struct Outline {
     chart: usize,
-    /// What is added to corners so that the first texel is [0, 0].
+    /// Offset of corners, so that the first texel is [0, 0].
     offset: [f64; 2],
     /// The first row of each column, and the one after its last.
     columns: Vec<[usize; 2]>,
@@ -124,7 +124,7 @@ impl Outline {
     }
 }
 
-/// What is added to the corners of each chart, times `scale`; none if there is not enough room.
+/// Offset of the corners of each chart, after the factor `scale`; none if there is not enough room.
 ///
 /// The highest chart comes first. Each lies on those before it, where it ends highest on the square, and among such places where it leaves least free below.
 fn packed(charts: &[Chart], scale: f64, size: usize) -> Option<Vec<[f64; 2]>> {

@@ -72,7 +72,7 @@ struct Summary {
     held_out: Option<f64>,
     /// In decibels, of the training and held-out views.
     psnr: [Option<f64>; 2],
-    /// The same of the colours of vertices.
+    /// PSNR of the colours of vertices, of these two parts.
     psnr_of_vertices: [Option<f64>; 2],
     /// Texels a side of the texture, and its charts.
     texture: Option<[usize; 2]>,

@@ -29,7 +29,7 @@ impl Textured {
     ///
     /// # Errors
     ///
-    /// Those of [`paint_texture`], and those of `told` but for an interrupt.
+    /// Errors of [`paint_texture`], and of `told` except an interrupt.
     pub(super) fn new(
         mesh: &Mesh,
         painted: &Mesh,
@@ -57,7 +57,7 @@ impl Textured {
         Ok(Self { mesh, atlas, found })
     }
 
-    /// What a camera sees of it, as [`textured_pixels`].
+    /// Its [`textured_pixels`] in a camera.
     pub(super) fn pixels(&self, camera: &Pinhole) -> Option<[Vec<f64>; 4]> {
         self.atlas.as_ref().map(|atlas| textured_pixels(&self.mesh, atlas, camera))
     }
