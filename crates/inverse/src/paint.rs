@@ -11,7 +11,7 @@ use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
 
 use crate::{PaintTargets, SolveConfig, Surface};
-use softrast_views::{Frame, PaintedView};
+use softrast_views::{Frame, PaintedView, Picture};
 
 type B = Autodiff<HostBackend>;
 
@@ -113,13 +113,16 @@ pub fn paint_until_stopped(
 
 /// The mean colour of all pixels that count; `None` if no pixel counts.
 fn mean_colour(views: &[PaintedView]) -> Option<[f64; 3]> {
-    let sum = |of: &dyn Fn(&PaintedView) -> &[f32]| -> f64 {
-        views.iter().flat_map(of).copied().map(f64::from).sum()
-    };
-    let total = sum(&|view| view.part.pixels());
+    let sum = |picture: &Picture| -> f64 { picture.pixels().iter().copied().map(f64::from).sum() };
+    let total: f64 = views.iter().map(|view| sum(&view.part)).sum();
+    let mut colours = [0.0; 3];
+    for view in views {
+        for (colour, channel) in colours.iter_mut().zip(view.over_black()) {
+            *colour += sum(&channel);
+        }
+    }
     // A sum of many 32-bit numbers may have a small rounding error.
-    let mean = |k: usize| (sum(&|view| view.over_black[k].pixels()) / total).clamp(0.0, 1.0);
-    (total > 0.0).then(|| [0, 1, 2].map(mean))
+    (total > 0.0).then(|| colours.map(|colour| (colour / total).clamp(0.0, 1.0)))
 }
 
 /// Subdivides the mesh until its faces cover few enough `pixels` on average, where all faces cover this many and half of them are visible.

@@ -23,12 +23,12 @@ impl<B: Backend> PaintTargets<B> {
         size: usize,
     ) -> Self {
         let (mut colours, mut parts, mut count) = (Vec::new(), Vec::new(), 0);
-        for (PaintedView { over_black, part, .. }, square) in views {
-            for channel in over_black {
+        for (view, square) in views {
+            for channel in view.over_black() {
                 let [levels, _] = channel.part(square, size);
                 colours.extend(levels);
             }
-            let [levels, _] = part.part(square, size);
+            let [levels, _] = view.part.part(square, size);
             parts.extend(levels);
             count += 1;
         }

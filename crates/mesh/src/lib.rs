@@ -19,6 +19,7 @@ mod chair;
 mod cluster;
 mod colours;
 mod corner;
+mod crossings;
 mod edges;
 mod error;
 mod format;

@@ -25,6 +25,7 @@ mod coloured_pixels;
 mod cut_sides;
 mod frame;
 mod hull;
+mod levels;
 mod mask_parts;
 mod mask_rules;
 mod painted_view;

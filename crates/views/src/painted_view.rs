@@ -1,7 +1,7 @@
 use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
 
-use crate::{Picture, View, coloured_pixels};
+use crate::{Picture, View, coloured_pixels, levels::Levels};
 
 /// Lower bound of squared errors: 100 dB.
 const LEAST_ERROR: f64 = 1e-10;
@@ -11,8 +11,8 @@ const LEAST_ERROR: f64 = 1e-10;
 pub struct PaintedView {
     /// The view.
     pub view: View,
-    /// Red, green and blue, in the levels of the picture, times the weight of each pixel.
-    pub over_black: [Picture; 3],
+    /// Red, green and blue, as the picture has them.
+    colours: [Levels; 3],
     /// The weight of each pixel, from 0 to 1.
     pub part: Picture,
     /// Whether weights are 0 or 1.
@@ -58,12 +58,37 @@ impl PaintedView {
             false if known.clone().eq(view.mask.pixels().iter().copied()) => view.mask.clone(),
             false => Picture::new(known.collect(), width),
         };
-        let over_black = colours.map(|channel| {
+        let colours = colours.map(|channel| {
             assert_eq!(channel.size(), part.size(), "sizes of a channel and the mask");
-            let pixels = channel.pixels().iter().zip(part.pixels());
-            Picture::new(pixels.map(|(x, part)| x * part).collect(), width)
+            Levels::of(channel.pixels())
         });
-        Self { view, over_black, part, opaque }
+        Self { view, colours, part, opaque }
+    }
+
+    /// Red, green and blue, in the levels of the picture, times the weight of each pixel. They are computed anew at each call: the view
+    /// itself keeps 16 bits of them where the picture has no more, half the memory of a [`Picture`].
+    pub fn over_black(&self) -> [Picture; 3] {
+        let width = self.part.size().width;
+        [0, 1, 2].map(|k| {
+            let pixels = (0..self.part.pixels().len()).map(|pixel| self.level(k, pixel));
+            Picture::new(pixels.collect(), width)
+        })
+    }
+
+    /// The level of a channel over black.
+    fn level(&self, channel: usize, pixel: usize) -> f32 {
+        self.colours[channel].at(pixel) * self.part.pixels()[pixel]
+    }
+
+    /// Whether at least one in a thousand of the pixels that count is not grey: its channels differ by a sixteenth or more.
+    pub fn is_coloured(&self) -> bool {
+        let counts = |&pixel: &usize| self.part.pixels()[pixel] > 0.0;
+        let in_colour = |&pixel: &usize| {
+            let [red, green, blue] = self.colours.each_ref().map(|levels| levels.at(pixel));
+            red.max(green).max(blue) - red.min(green).min(blue) >= 1.0 / 16.0
+        };
+        let all = || (0..self.part.pixels().len()).filter(counts);
+        1000 * all().filter(in_colour).count() > all().count()
     }
 
     /// Whether the picture is opaque everywhere, so that weights are 0 or 1.
@@ -102,7 +127,7 @@ impl PaintedView {
         let inside = |&pixel: &usize| shown(pixel) && !unknown(pixel);
         let pixels: Vec<usize> = (0..part.len()).filter(inside).collect();
         let error = |pixel: usize| {
-            let known = self.over_black.iter().map(|channel| f64::from(channel.pixels()[pixel]));
+            let known = (0..3).map(|k| f64::from(self.level(k, pixel)));
             let drawn = colours.iter().map(|channel| gain(pixel) * channel[pixel]);
             drawn.zip(known).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 3.0
         };
@@ -112,7 +137,8 @@ impl PaintedView {
 }
 
 impl View {
-    /// Red, green, blue and opacity of the picture file, undistorted, with as many pixels as the mask.
+    /// Red, green, blue and opacity of the picture file, undistorted, with as many pixels as the mask. Levels between those of the file,
+    /// from a lens or a reduced size, are rounded to 16 bits.
     ///
     /// # Errors
     ///
@@ -129,10 +155,20 @@ impl View {
                 mask.width,
                 mask.height
             );
-            Ok(if self.distortion.is_some() { undistorted(self, colours) } else { colours })
+            Ok(match self.distortion {
+                Some(_) => undistorted(self, colours).map(of_16_bits),
+                None if mask != colours[3].size() => colours.map(of_16_bits),
+                None => colours,
+            })
         };
         of().with_context(|| self.name.clone())
     }
+}
+
+/// The picture with each level a multiple of 1 / 65535.
+fn of_16_bits(picture: Picture) -> Picture {
+    let levels = picture.pixels().iter().map(|&x| (x * Levels::MOST).round() / Levels::MOST);
+    Picture::new(levels.collect(), picture.size().width)
 }
 
 /// Colours and opacity of a picture as a straight lens would have shown them: a colour counts as much as it is opaque.
@@ -188,7 +224,7 @@ mod tests {
         let clear = Picture::new(vec![0.0, 0.6, 1.0, 1.0, 0.0, 0.3], 6);
         let seen = PaintedView::new(view(mask.clone(), 6), gray(), &clear);
         assert_eq!(seen.part.pixels(), [0.0, 0.6, 1.0, 1.0, 0.0, 0.3]);
-        assert_eq!(seen.over_black[2].pixels(), [0.0, 0.3, 0.5, 0.5, 0.0, 0.15]);
+        assert_eq!(seen.over_black()[2].pixels(), [0.0, 0.3, 0.5, 0.5, 0.0, 0.15]);
         let opaque = Picture::new(vec![1.0; 6], 6);
         let seen = PaintedView::new(view(mask, 6), gray(), &opaque);
         assert_eq!(seen.part.pixels(), [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]);

@@ -159,7 +159,7 @@ impl Seen {
             (Sample { texel, right: part(x), down: part(y) }, face as u32)
         });
         let [part, _] = view.part.part(square, side);
-        let over_black = view.over_black.each_ref().map(|channel| {
+        let over_black = view.over_black().map(|channel| {
             let [levels, _] = channel.part(square, side);
             levels
         });

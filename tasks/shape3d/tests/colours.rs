@@ -144,7 +144,7 @@ fn a_known_shape_gets_its_colours_back_over_nothing_and_over_white() {
 }
 
 #[test]
-fn shape_and_colours_are_found_together_and_without_the_flag_there_are_none() {
+fn shape_and_colours_are_found_together_unless_masks_alone_are_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     pictures(folder.path(), false);
     let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
@@ -152,10 +152,25 @@ fn shape_and_colours_are_found_together_and_without_the_flag_there_are_none() {
     let found = run(&out, &[&words[..], &["--colour"]].concat()).unwrap();
     assert!(number(&found, "held_out_iou") > 0.95, "{found}");
     assert!(number(&found, "held_out_psnr") > 20.0, "{found}");
-    let found = run(&out.join("plain"), &words).unwrap();
+    let usual = run(&out.join("usual"), &words).unwrap();
+    assert_eq!(usual["held_out_psnr"], found["held_out_psnr"]);
+    let found = run(&out.join("plain"), &[&words[..], &["--masks-only"]].concat()).unwrap();
     assert!(found.get("held_out_psnr").is_none() && found["views"][0].get("psnr").is_none());
     assert_eq!(Mesh::load(out.join("plain/mesh.ply")).unwrap().colours(), None);
     assert!(!out.join("plain/colours.png").exists());
+}
+
+#[test]
+fn grey_pictures_are_masks_alone_unless_colours_are_asked_for() {
+    let grey = ball().positions().iter().map(|p| [0.5 + 0.2 * p[1]; 3]).collect();
+    let folder = tempfile::tempdir().unwrap();
+    pictures_of(&ball().with_colours(grey).unwrap(), folder.path(), false);
+    let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
+    let words = ["--views", views, "--steps", "5"];
+    assert!(run(&out, &words).unwrap().get("train_psnr").is_none());
+    assert!(!out.join("textured.glb").exists());
+    let found = run(&out, &[&words[..], &["--colour"]].concat()).unwrap();
+    assert!(found.get("train_psnr").is_some(), "{found}");
 }
 
 #[test]
@@ -249,7 +264,9 @@ fn what_does_not_go_together_is_one_line() {
         &["--smooth", "--mesh"],
     );
     error(&["--views", views, "--colour", "--mesh", "no.ply"], &["no.ply"]);
-    error(&["--views", views, "--texture-size", "256"], &["--colour"]);
+    error(&["--views", views, "--masks-only", "--texture-size", "256"], &["--masks-only"]);
+    error(&["--views", views, "--masks-only", "--colour"], &["--masks-only", "--colour"]);
+    error(&["--views", views, "--normals", "--texture-size", "256"], &["--colour"]);
     error(&["--views", views, "--colour", "--texture-size", "63"], &["63", "64..=4096"]);
     error(&["--views", views, "--colour", "--texture-size", "5000"], &["5000", "64..=4096"]);
     // A mesh that lies elsewhere is painted by nothing: that is said.

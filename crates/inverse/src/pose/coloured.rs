@@ -50,7 +50,11 @@ impl<B: RasterBackend> ColouredViews<B> {
         let of = |which: &dyn Fn(&'_ PaintedView) -> &'_ Picture| {
             parts(pictures.iter().map(|&(view, square)| (which(view), square)), size)
         };
-        let channels = [0, 1, 2].map(|k| of(&|view| &view.over_black[k]));
+        let colours: Vec<[Picture; 3]> =
+            pictures.iter().map(|(view, _)| view.over_black()).collect();
+        let squares = || pictures.iter().map(|&(_, square)| square);
+        let channels =
+            [0, 1, 2].map(|k| parts(colours.iter().map(|of| &of[k]).zip(squares()), size));
         let (masks, shown) = (of(&|view| &view.view.mask), of(&|view| &view.part));
         let views = masks.len();
         let over_black = (0..views).flat_map(|v| channels.each_ref().map(|channel| &channel[v][0]));

@@ -172,7 +172,7 @@ impl<'a> ShapeFit<'a> {
             }
             before = wanted;
         }
-        let mesh = shape.mesh()?;
+        let mesh = shape.mesh()?.without_self_intersections();
         if !has_colours {
             return Ok(FoundShape { mesh, stopped });
         }

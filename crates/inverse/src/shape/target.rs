@@ -1,6 +1,6 @@
-use softrast_views::Picture;
+use softrast_views::{PaintedView, Picture};
 
-use super::view::{Shown, ViewOfShape};
+use super::view::ViewOfShape;
 
 /// The square of a view at one resolution, row by row from the top.
 #[derive(Clone, Debug)]
@@ -31,17 +31,17 @@ impl Target {
         let part = |picture: &Picture| -> [Vec<f32>; 2] {
             picture.part(view.square, size).map(|levels| levels.iter().map(|&x| x as f32).collect())
         };
-        let channels = |shown: &Shown, middle: f32| {
+        let channels = |shown: &PaintedView, middle: f32| {
             let [counts, _] = part(&shown.part);
-            let levels = shown.channels.each_ref().map(|channel| {
-                let [mut levels, _] = part(channel);
+            let levels = shown.over_black().map(|channel| {
+                let [mut levels, _] = part(&channel);
                 levels
                     .iter_mut()
                     .zip(&counts)
                     .for_each(|(level, counts)| *level -= middle * counts);
                 levels
             });
-            Channels { levels, part: counts, is_opaque: shown.is_opaque }
+            Channels { levels, part: counts, is_opaque: shown.is_opaque() }
         };
         let [mask, counted] = part(&view.mask);
         let normals = view.normals.as_ref().map(|shown| channels(shown, 0.5));

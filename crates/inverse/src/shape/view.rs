@@ -12,26 +12,8 @@ pub struct ViewOfShape {
     /// The drawn square: left, top and extent in pixels.
     pub(super) square: [f64; 3],
     pub(super) mask: Picture,
-    pub(super) normals: Option<Shown>,
-    pub(super) colours: Option<Shown>,
-}
-
-/// Three channels of a picture.
-#[derive(Clone, Debug)]
-pub(super) struct Shown {
-    /// Channels over black.
-    pub(super) channels: [Picture; 3],
-    /// Fraction of each pixel that counts.
-    pub(super) part: Picture,
-    /// Whether pixels count in full or not at all.
-    pub(super) is_opaque: bool,
-}
-
-impl Shown {
-    fn of(painted: &PaintedView) -> Self {
-        let (channels, part) = (painted.over_black.clone(), painted.part.clone());
-        Self { channels, part, is_opaque: painted.is_opaque() }
-    }
+    pub(super) normals: Option<PaintedView>,
+    pub(super) colours: Option<PaintedView>,
 }
 
 impl ViewOfShape {
@@ -52,13 +34,13 @@ impl ViewOfShape {
     /// Adds the colours of a picture of the same pixels.
     #[must_use]
     pub fn with_colours(self, painted: &PaintedView) -> Self {
-        Self { colours: Some(Shown::of(painted)), ..self }
+        Self { colours: Some(painted.clone()), ..self }
     }
 
     /// Adds normals: a picture of the same pixels whose red, green and blue are `(n + 1) / 2` of unit normals n in world axes.
     #[must_use]
     pub fn with_normals(self, painted: &PaintedView) -> Self {
-        Self { normals: Some(Shown::of(painted)), ..self }
+        Self { normals: Some(painted.clone()), ..self }
     }
 
     /// The camera of its square on `size` × `size` pixels.

@@ -309,7 +309,8 @@ fn drawn(mesh: &Mesh, one: &Solved, pose: &FoundPose) -> RgbImage {
 fn beside(mesh: &Mesh, one: &Solved) -> Option<[RgbImage; 2]> {
     let view = one.painted.as_ref()?;
     let camera = &one.poses[0].camera;
-    let picture = view.over_black.iter().flat_map(|channel| channel.pixels());
+    let channels = view.over_black();
+    let picture = channels.iter().flat_map(|channel| channel.pixels());
     let [red, green, blue, _] = coloured_pixels(mesh, camera);
     let planes = [picture.map(|&x| f64::from(x)).collect(), [red, green, blue].concat()];
     Some(planes.map(|planes: Vec<f64>| {

@@ -77,6 +77,8 @@ struct Summary {
     /// Texels a side of the texture, and its charts.
     texture: Option<[usize; 2]>,
     path: PathBuf,
+    /// Pairs of faces that pass through each other.
+    crossing: usize,
     seconds: f64,
 }
 
@@ -117,6 +119,7 @@ pub(super) fn answer(
             .map(|held_out| mean(scored, held_out, Scored::psnr_of_vertices)),
         texture: textured.and_then(|textured| textured.found),
         path: given.folder().join(MESHES[0]),
+        crossing: mesh.self_intersections().len(),
         seconds,
     };
     let mut warnings = notes;
@@ -134,6 +137,9 @@ pub(super) fn answer(
              (--invert)",
             summary.train
         ));
+    }
+    if summary.crossing > 0 && given.args.mesh.is_none() {
+        warnings.push(format!("{} pairs of faces pass through each other", summary.crossing));
     }
     let pictures = Pictures::new(scored)?;
     let text = text(mesh, scored, &summary);
@@ -288,7 +294,7 @@ fn table(scored: &[Scored], in_colour: bool) -> Table {
 }
 
 fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) -> Value {
-    let Summary { train, held_out, psnr, path, seconds, .. } = summary;
+    let Summary { train, held_out, psnr, path, crossing, seconds, .. } = summary;
     let mut json = json!({
         "train_iou": train,
         "held_out_iou": held_out,
@@ -296,6 +302,7 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
         "glb_origin": mesh.glb_origin(),
         "vertices": mesh.positions().len(),
         "faces": mesh.faces().len(),
+        "self_intersections": crossing,
         "seconds": seconds,
         "views": scored.iter().map(|one| json!({
             "name": one.view.name,

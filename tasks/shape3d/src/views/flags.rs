@@ -22,13 +22,17 @@ pub struct Views {
     #[arg(long, value_enum, requires = "views", conflicts_with = "template")]
     pub start: Option<Begin>,
 
-    /// Fit the shape to the colours of the pictures too, and give them to the mesh. With --mesh the shape is given, in the world units of
-    /// the cameras, and fixed
+    /// Fit the shape to the colours of the pictures too, and give them to the mesh [default: if all pictures are there and some are not
+    /// grey]. With --mesh the shape is given, in the world units of the cameras, and fixed
     #[arg(long)]
     pub colour: bool,
 
-    /// Texels a side of the texture of --colour, from 64 to 4096 [default: about one for each pixel that shows the surface, up to 2048]
-    #[arg(long, value_name = "N", requires = "colour", value_parser = clap::value_parser!(u32).range(FoundTexture::SIZES[0] as i64..=FoundTexture::SIZES[1] as i64))]
+    /// Use the masks alone, whatever the pictures show
+    #[arg(long, requires = "views", conflicts_with_all = ["colour", "mesh"])]
+    pub masks_only: bool,
+
+    /// Texels a side of the texture, from 64 to 4096 [default: about one for each pixel that shows the surface, up to 2048]
+    #[arg(long, value_name = "N", requires = "views", conflicts_with = "masks_only", value_parser = clap::value_parser!(u32).range(FoundTexture::SIZES[0] as i64..=FoundTexture::SIZES[1] as i64))]
     pub texture_size: Option<u32>,
 
     /// Let normals pull the shape: red, green and blue are (n + 1) / 2 of a normal n in the axes of the world, in the pictures, or in those of a folder with

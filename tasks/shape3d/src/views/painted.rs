@@ -37,7 +37,8 @@ impl Colours {
         let psnr_of_vertices = view.psnr_of(&of_vertices);
         let drawn = textured.and_then(|textured| textured.pixels(camera)).unwrap_or(of_vertices);
         let psnr = view.psnr_of(&drawn);
-        let picture = view.over_black.iter().flat_map(|channel| channel.pixels());
+        let channels = view.over_black();
+        let picture = channels.iter().flat_map(|channel| channel.pixels());
         let picture = image(picture.map(|&x| f64::from(x)).collect());
         let [red, green, blue, _] = drawn;
         Self { psnr, psnr_of_vertices, pair: [picture, image([red, green, blue].concat())] }

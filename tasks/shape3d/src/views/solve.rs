@@ -6,7 +6,7 @@ use std::{
 use anyhow::{Context, ensure};
 use softrast_cli::{Answer, Given};
 use softrast_inverse::silhouette_pixels;
-use softrast_lab::{Error, for_page, format::counted, overlay};
+use softrast_lab::{Error, for_page, format::counted, overlay, program::say};
 use softrast_mesh::Mesh;
 use softrast_views::{
     CameraFile, PaintedView, View, find_mask, frame_of_masks, mask_iou, reading_notes,
@@ -87,25 +87,33 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         None => Vec::new(),
     };
     let pictures = pictures.chain(normals.iter().map(|view| view.picture.clone()));
-    given.will_write(names(flags.colour), reads.into_inner().into_iter().chain(pictures))?;
+    // Faults of pictures are reported before the work.
+    let sets: Vec<&Vec<View>> = loaded().collect();
+    let painted = painted_views(flags, &sets)?;
+    let in_colour = painted.is_some();
+    if flags.texture_size.is_some() && !in_colour {
+        return Err(Error::usage(
+            "--texture-size sizes a texture, and there is none: add --colour (grey pictures and --normals have no texture otherwise)",
+        ));
+    }
+    given.will_write(names(in_colour), reads.into_inner().into_iter().chain(pictures))?;
     let note = cameras.note().map(str::to_owned);
     let notes = note.into_iter().chain(loaded().flat_map(|views| reading_notes(views)));
     let notes: Vec<String> = notes.collect();
-    // Faults of pictures are reported before the work.
-    let paint = |views: &[View]| {
-        let painted = views.iter().filter(|_| flags.colour).map(PaintedView::load);
-        painted.collect::<anyhow::Result<Vec<_>>>()
-    };
     let count = if let Some(HoldOut::Count(count)) = flags.hold_out { count } else { 0 };
     let normals = match normals.is_empty() {
         true => normals,
         false => split_held_out(normals, count)?.into_iter().next().unwrap_or_default(),
     };
-    let [train, held_out] = split_held_out(all, count)?;
-    let parts = [train, apart.unwrap_or(held_out)];
-    let [to_paint, to_compare] = [paint(&parts[0])?, paint(&parts[1])?];
     let normals = normals.iter().map(PaintedView::load).collect::<anyhow::Result<Vec<_>>>()?;
-    let [train, held_out] = parts;
+    let [train, held_out] = split_held_out(all, count)?;
+    let mut painted = painted.unwrap_or_default().into_iter();
+    let [to_paint, painted_aside] = match painted.next() {
+        Some(painted) => split_held_out(painted, count)?,
+        None => [Vec::new(), Vec::new()],
+    };
+    let to_compare = painted.next().unwrap_or(painted_aside);
+    let held_out = apart.unwrap_or(held_out);
     let clock = std::time::Instant::now();
     let of_shape = match (&args.mesh, &args.template) {
         (Some(_), _) => 0,
@@ -113,9 +121,9 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         (None, None) => surface::steps(given),
     };
     // A fitted surface already has its colours.
-    let paints = flags.colour && (args.mesh.is_some() || args.template.is_some());
+    let paints = in_colour && (args.mesh.is_some() || args.template.is_some());
     let of_colours = if paints { painted::config(given).steps } else { 0 };
-    let of_texture = if flags.colour { textured::STEPS } else { 0 };
+    let of_texture = if in_colour { textured::STEPS } else { 0 };
     let steps = of_shape + of_colours + of_texture;
     let mut progress = given.progress(steps)?;
     let mut mesh = match (&args.mesh, &args.template) {
@@ -138,7 +146,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         }
     };
     let mut textured = None;
-    if flags.colour {
+    if in_colour {
         let painted = match paints {
             true => painted::painted(given, &mesh, &to_paint, |step, loss| {
                 progress.step(of_shape + step, loss)
@@ -166,6 +174,30 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     answer(given, &mesh, textured.as_ref(), &scored, notes, seconds)
 }
 
+/// The views of each set with the colours of their pictures, if these are asked for, or are all there and some are not grey.
+fn painted_views(
+    flags: &Views,
+    sets: &[&Vec<View>],
+) -> anyhow::Result<Option<Vec<Vec<PaintedView>>>> {
+    if !flags.colour && (flags.masks_only || flags.normals.is_some()) {
+        return Ok(None);
+    }
+    let load = |views: &&Vec<View>| views.iter().map(PaintedView::load).collect();
+    let painted: anyhow::Result<Vec<Vec<PaintedView>>> = sets.iter().map(load).collect();
+    if flags.colour {
+        return painted.map(Some);
+    }
+    let is_coloured =
+        |painted: &Vec<Vec<PaintedView>>| painted.iter().flatten().any(PaintedView::is_coloured);
+    let painted = painted.ok().filter(is_coloured);
+    if painted.is_some() {
+        say(
+            "the pictures have colours, which pull the shape and paint it (--masks-only uses the masks alone)",
+        );
+    }
+    Ok(painted)
+}
+
 /// The views with pictures of their normals: their own, or those of a folder.
 fn of_normals(views: &[View], folder: Option<&Path>) -> anyhow::Result<Vec<View>> {
     let Some(folder) = folder else { return Ok(views.to_vec()) };
@@ -180,7 +212,7 @@ fn of_normals(views: &[View], folder: Option<&Path>) -> anyhow::Result<Vec<View>
 }
 
 /// Training views, and `hold_out` evenly spaced held-out ones.
-fn split_held_out(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>; 2]> {
+fn split_held_out<V>(all: Vec<V>, hold_out: usize) -> anyhow::Result<[Vec<V>; 2]> {
     let count = all.len();
     ensure!(
         count >= 2,
