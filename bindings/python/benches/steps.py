@@ -1,13 +1,15 @@
-"""A step of an optimisation on W1: 1,280 faces, 24 views of 64 x 64, float32: projection, image, mean squared difference, gradient to the
-vertices. Beside it the published formula `1 - prod(1 - sigmoid(-dists / sigma))` in plain torch ops, over all pairs of pixel and face.
+"""A step of an optimisation, float32: projection, image, mean squared difference, gradient to the vertices.
 
-`python bindings/python/benches/w1.py [target/release/examples/w1]`, in an environment with the wheel and torch. With the path of the example
-`w1` its step in Rust is timed in turn with ours, so that both have the same neighbours on the machine. The last line is of the same step under
+`python bindings/python/benches/steps.py [--mesh W2_MESH.obj] [--rust target/release/examples/step]`, in an environment with the wheel and torch.
+
+W1 is a sphere of 1,280 faces in 24 views of 64 x 64; with a mesh it is W2, one view of 256 x 256. With the path of the example `step` the step
+in Rust is timed in turn with ours, so that both have the same neighbours on the machine; else, beside W1, the published formula
+`1 - prod(1 - sigmoid(-dists / sigma))` in plain torch ops, over all pairs of pixel and face. The last line is of the same step under
 `torch.compile(fullgraph=True)`, in turn with eager mode.
 """
 
+import argparse
 import subprocess
-import sys
 import time
 
 import numpy as np
@@ -16,7 +18,13 @@ import torch
 import softrast
 import softrast.torch as st
 
-SIGMA, SIZE, VIEWS = 1e-4, 64, 24
+parser = argparse.ArgumentParser()
+parser.add_argument("--mesh")
+parser.add_argument("--rust")
+given = parser.parse_args()
+
+SIGMA = 1e-4
+SIZE, VIEWS, AZIMUTH = (256, 1, 180.0) if given.mesh else (64, 24, 0.0)
 
 
 def formula(seen, faces):
@@ -47,8 +55,8 @@ def median(step, repetitions):
     return np.median(times)
 
 
-positions, faces, _ = softrast.icosphere(3)
-cameras = torch.from_numpy(softrast.orbit(2.732, 0.0, np.arange(VIEWS) * 15.0)).float()
+positions, faces, _ = softrast.load_mesh(given.mesh) if given.mesh else softrast.icosphere(3)
+cameras = torch.from_numpy(softrast.orbit(2.732, 0.0, AZIMUTH + np.arange(VIEWS) * 15.0)).float()
 vertices = torch.from_numpy(positions).float()[None].requires_grad_()
 renderer = softrast.Renderer(faces, SIZE, softrast.Softness("logistic", SIGMA, squared=True))
 corners = torch.from_numpy(faces)
@@ -83,21 +91,21 @@ def theirs_of_one_view():
     (image - target[0]).pow(2).mean().backward()
 
 
-with torch.no_grad():
-    seen = st.project(vertices, cameras[:1])
-    difference = (st.silhouette(renderer, seen)[0] - formula(seen[0], corners)).abs().max()
-print(f"largest difference of a pixel {difference:.1e}")
 median(ours, 20)
 rounds = []
-for _ in range(7 if sys.argv[1:] else 1):
-    rust = sys.argv[1:] and float(subprocess.run(sys.argv[1:], stdout=subprocess.PIPE, text=True, check=True).stdout.split()[1])
-    rounds.append((1e3 * median(ours, 200), rust))
+rust = [given.rust, *([given.mesh] if given.mesh else [])] if given.rust else None
+for _ in range(7 if rust else 1):
+    theirs = rust and float(subprocess.run(rust, stdout=subprocess.PIPE, text=True, check=True).stdout.split()[1])
+    rounds.append((1e3 * median(ours, 200), theirs))
 steps = [step for step, _ in rounds]
 print(f"softrast {np.median(steps):.2f} ms")
-if sys.argv[1:]:
-    print("Rust {:.2f} ms; ratio, round by round:".format(np.median([rust for _, rust in rounds])), *(f"{a / b:.2f}" for a, b in rounds))
-    compare_compiled()
-    sys.exit()
-plain = VIEWS * median(theirs_of_one_view, 2)
-print(f"the formula in torch ops, 24 times one view, {plain:.1f} s; ratio {1e3 * plain / np.median(steps):.0f}")
+if rust:
+    print("Rust {:.2f} ms; ratio, round by round:".format(np.median([theirs for _, theirs in rounds])), *(f"{a / b:.2f}" for a, b in rounds))
+elif not given.mesh:
+    with torch.no_grad():
+        seen = st.project(vertices, cameras[:1])
+        difference = (st.silhouette(renderer, seen)[0] - formula(seen[0], corners)).abs().max()
+    print(f"largest difference of a pixel {difference:.1e}")
+    plain = VIEWS * median(theirs_of_one_view, 2)
+    print(f"the formula in torch ops, 24 times one view, {plain:.1f} s; ratio {1e3 * plain / np.median(steps):.0f}")
 compare_compiled()

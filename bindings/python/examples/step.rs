@@ -1,7 +1,8 @@
-//! The step that `benches/w1.py` times, in Rust: `cargo run --release --example w1`.
+//! The step that `benches/steps.py` times, in Rust: `cargo run --release --example step -- [W2_MESH.obj]`. Without a mesh it is W1.
 
 use std::time::Instant;
 
+use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::{Orbit, SoftRenderer, mse_loss, project, vertices};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
@@ -10,18 +11,17 @@ type B = Autodiff<NdArray<f32>>;
 
 fn main() {
     let device = Default::default();
-    let mesh = softrast_mesh::icosphere(3);
-    let orbit = |k| Orbit {
-        distance: 2.732,
-        elevation_deg: 0.0,
-        azimuth_deg: 15.0 * f64::from(k),
-        fov_deg: 60.0,
+    let (mesh, azimuths, size) = match std::env::args().nth(1) {
+        Some(path) => (Mesh::load(path).expect("a mesh"), vec![180.0], 256),
+        None => (icosphere(3), (0..24).map(|k| 15.0 * f64::from(k)).collect(), 64),
     };
-    let cameras: Vec<_> = (0..24).map(orbit).collect();
+    let orbit =
+        |&azimuth_deg| Orbit { distance: 2.732, elevation_deg: 0.0, azimuth_deg, fov_deg: 60.0 };
+    let cameras: Vec<_> = azimuths.iter().map(orbit).collect();
     let cameras = Orbit::tensors::<B>(&cameras, &device);
     let softness = EdgeSoftness::squared(Family::Logistic);
-    let renderer = SoftRenderer::new(mesh.faces(), 64, softness, 1e-4);
-    let target = Tensor::<B, 3>::zeros([24, 64, 64], &device);
+    let renderer = SoftRenderer::new(mesh.faces(), size, softness, 1e-4);
+    let target = Tensor::<B, 3>::zeros([azimuths.len(), size, size], &device);
     let mut times = Vec::new();
     for _ in 0..220 {
         let corners = vertices::<B>(mesh.positions(), &device).require_grad();
