@@ -159,7 +159,7 @@ impl MethodArgs {
 /// Colour of a method in every chart, distinguishable also without seeing red. Methods without an entry share one dark colour.
 pub fn method_colour(name: &str) -> [u8; 3] {
     match name.split([' ', '.']).next().unwrap_or_default() {
-        "preset" => [110, 110, 110],
+        "preset" => [20, 20, 20],
         "searched" => [150, 120, 40],
         "learned-mlp" => [170, 20, 60],
         "learned-surrogate" => [110, 80, 190],
@@ -168,7 +168,7 @@ pub fn method_colour(name: &str) -> [u8; 3] {
         "exp" => [0, 140, 100],
         "gamma" => [204, 121, 167],
         "mlp" => [196, 84, 24],
-        _ => [40, 40, 40],
+        _ => [130, 130, 130],
     }
 }
 

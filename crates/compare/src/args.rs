@@ -36,8 +36,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS, value_parser = named)]
     pub methods: Vec<NamedMethod>,
 
-    /// Methods that the charts of error over seconds also show at half the resolution, with another pixel tolerance, and on every other
-    /// backend that the program was built with; "" for none
+    /// Methods that are also compared at half the resolution, with another pixel tolerance, and on every other backend that the program was
+    /// built with; "" for none
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED, value_parser = named)]
     pub varied: Vec<NamedMethod>,
 
@@ -65,7 +65,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.md")]
     pub tables: Option<PathBuf>,
 
-    /// Only rebuild the tables of these documents from their stored records; an error if one differed
+    /// Only rebuild the tables of these documents, and the charts beside them, from their stored records; an error if a table differed
     #[arg(long, value_name = "FILE.md,...", value_delimiter = ',', conflicts_with = "tables")]
     pub recompute: Vec<PathBuf>,
 

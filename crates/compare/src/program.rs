@@ -1,5 +1,6 @@
 use std::{
     ffi::OsString,
+    fs,
     io::Write,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -16,7 +17,7 @@ use softrast_lab::{
 
 use crate::{
     Args, Cell, Measured, Record,
-    charts::{Charts, by_variant},
+    charts::{Chart, charts},
     documents::recomputed,
     records,
     results::{html, markdown},
@@ -38,7 +39,7 @@ fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> 
     output.print(args.json, &again, stdout)
 }
 
-/// Rebuilds the tables of documents from their stored records.
+/// Rebuilds the tables of documents and the charts beside them from their stored records.
 ///
 /// # Errors
 ///
@@ -46,6 +47,14 @@ fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> 
 fn recompute(args: &Args) -> anyhow::Result<Output> {
     let mut others = Vec::new();
     for document in &args.recompute {
+        let folder = document.with_extension("");
+        if let Ok(text) = fs::read_to_string(folder.join(RECORDS)) {
+            for Chart { name, plot, .. } in charts(&records::read(&text)?) {
+                let file = folder.join(format!("{name}.svg"));
+                write_atomically(&file, plot.svg()?.as_bytes())
+                    .with_context(|| format!("cannot write {file:?}"))?;
+            }
+        }
         let [old, new] = recomputed(document)?;
         if old != new {
             write_atomically(document, new.as_bytes())
@@ -172,14 +181,14 @@ impl Folders {
 
     /// Writes tables, report, charts and numbers.
     fn write(&mut self, measured: &[Measured], command: &str) -> anyhow::Result<()> {
-        let charts = Charts::new(&by_variant(measured));
-        for chart in charts.iter() {
+        let records: Vec<Record> = measured.iter().map(Record::of).collect();
+        let charts = charts(&records);
+        for chart in &charts {
             self.charts.stage(&format!("{}.svg", chart.name), chart.plot.svg()?.as_bytes())?;
             self.charts.stage(&format!("{}.csv", chart.name), chart.plot.csv().as_bytes())?;
         }
-        let records: Vec<Record> = measured.iter().map(Record::of).collect();
         self.charts.stage(RECORDS, records::text(&records)?.as_bytes())?;
-        let tables = markdown(measured, &records, &charts, command, Some(&self.shown))?;
+        let tables = markdown(&records, &charts, command, Some(&self.shown))?;
         self.tables.stage(&self.document, tables.as_bytes())?;
         self.out.stage(CELLS, records::csv(&records).as_bytes())?;
         self.out.stage(PAGE, html(measured, &records, &charts, command)?.as_bytes())?;

@@ -2,22 +2,17 @@
 
 use std::fmt::Write;
 
-use softrast_cli::Variant;
 use softrast_lab::{
     machine,
     report::{Beside, Report},
 };
 
-use crate::{
-    Measured, Record,
-    charts::{Chart, Charts, by_variant},
-    documents::block,
-    groups, tables,
-};
+use crate::{Measured, Record, charts::Chart, documents::block, groups::by_variant, tables};
 
 const HEAD: &str = include_str!("text/head.md");
 const READING: &str = include_str!("text/reading.md");
 const SECONDS: &str = include_str!("text/seconds.md");
+const PAPER: &str = include_str!("text/paper.md");
 const CROSSED: &str = include_str!("text/crossed.md");
 
 /// The tables of the paper with our figures, as Markdown. The text names `command` as its origin; `pictures` is the charts' folder relative
@@ -27,9 +22,8 @@ const CROSSED: &str = include_str!("text/crossed.md");
 ///
 /// If a table has no records.
 pub(crate) fn markdown(
-    measured: &[Measured],
     records: &[Record],
-    charts: &Charts,
+    charts: &[Chart],
     command: &str,
     pictures: Option<&str>,
 ) -> anyhow::Result<String> {
@@ -39,39 +33,36 @@ pub(crate) fn markdown(
         machine(),
         table("tasks")?
     );
-    for (group, charts) in by_variant(measured).iter().zip(&charts.of_variants) {
-        let cell = &group[0].cell;
+    for (group, chart) in by_variant(records).iter().zip(charts) {
+        let first = group[0];
+        let (task, variant) = (first.task(), first.variant());
         // Writing to a string does not fail.
-        if cell.variant == Variant::Original {
-            let _ = write!(text, "\n### {}\n\n{}\n", cell.task.title(), cell.task.paper().note);
+        if first.original {
+            let _ = write!(text, "\n### {}\n\n{}\n", task.title(), task.paper().note);
         }
-        let variant = cell.variant.name();
-        let errors = table(&format!("errors {} {variant}", cell.task.name()))?;
-        let _ = write!(text, "\n**{variant}**, seeds: {}\n\n{errors}", cell.runs);
-        text.extend(charts.iter().map(|chart| shown(chart, pictures)));
+        let errors = table(&format!("errors {} {variant}", task.name()))?;
+        let _ = write!(text, "\n**{variant}**, seeds: {}\n\n{errors}", first.returned.len());
+        text += &shown(chart, pictures);
     }
+    let _ = write!(text, "\n## Table 3 in the paper's unit\n\n{PAPER}\n{}", table("paper")?);
     let _ = write!(text, "\n## Table 5: seconds\n\n{SECONDS}\n{}", table("seconds")?);
     if records.iter().any(|record| !record.compared) {
         let crossed = table("crossed")?;
         let _ = write!(text, "\n## Table 6: cross evaluation\n\n{CROSSED}\n{crossed}");
-    }
-    if let Some(chart) = &charts.profile {
-        text += "\n## Who is fast how often\n";
-        text += &shown(chart, pictures);
     }
     Ok(text)
 }
 
 fn shown(chart: &Chart, pictures: Option<&str>) -> String {
     let Some(folder) = pictures else { return String::new() };
-    format!("\n![{0}]({folder}/{0}.svg)\n\n{1}\n", chart.name, chart.caption)
+    format!("\n![{}]({folder}/{}.svg)\n", chart.caption, chart.name)
 }
 
 /// The tables and charts as one HTML page, with the pictures of the first seed of every cell.
 pub(crate) fn html(
     measured: &[Measured],
     records: &[Record],
-    charts: &Charts,
+    charts: &[Chart],
     command: &str,
 ) -> anyhow::Result<String> {
     let mut report = Report::new("compare", "All methods on all tasks");
@@ -79,18 +70,17 @@ pub(crate) fn html(
     READING.split("\n\n").for_each(|text| report.paragraph(&text.replace("**", "")));
     report.heading("Tasks");
     report.table(&tables::tasks(records));
-    let errors = groups::by_variant(records);
-    let groups = by_variant(measured);
-    for ((group, charts), errors) in groups.iter().zip(&charts.of_variants).zip(&errors) {
-        let cell = &group[0].cell;
-        report.heading(&format!("{}, {}", cell.task.title(), cell.variant.name()));
-        report.paragraph(cell.task.paper().note);
-        report.paragraph(&format!("Seeds: {}", cell.runs));
-        report.table(&tables::errors(errors));
-        for chart in charts {
-            report.chart(&chart.plot.svg()?, &chart.caption);
-        }
-        for one in group {
+    for (group, chart) in by_variant(records).iter().zip(charts) {
+        let first = group[0];
+        report.heading(&format!("{}, {}", first.task().title(), first.variant()));
+        report.paragraph(first.task().paper().note);
+        report.paragraph(&format!("Seeds: {}", first.returned.len()));
+        report.table(&tables::errors(group));
+        report.chart(&chart.plot.svg()?, &chart.caption);
+        let here = |one: &&Measured| {
+            one.cell.task.name() == first.task && one.cell.variant.name() == first.variant()
+        };
+        for one in measured.iter().filter(here) {
             if let Some(pictures) = &one.pictures {
                 report.picture(&pictures.before_after, &format!("{}, first seed", one.cell.name));
             }
@@ -103,10 +93,6 @@ pub(crate) fn html(
         report.heading("Cross evaluation");
         report.paragraph(CROSSED);
         report.table(&table);
-    }
-    if let Some(chart) = &charts.profile {
-        report.heading("Who is fast how often");
-        report.chart(&chart.plot.svg()?, &chart.caption);
     }
     let beside = [
         Beside::new("runs.jsonl", "every run"),
@@ -122,7 +108,7 @@ mod tests {
     #[test]
     fn the_document_has_the_texts_that_another_call_would_print() {
         let document = include_str!("../../../docs/results.md");
-        for text in [HEAD, READING, SECONDS, CROSSED] {
+        for text in [HEAD, READING, PAPER, SECONDS, CROSSED] {
             assert!(
                 document.contains(text.trim()),
                 "docs/results.md has another text than: {text}"

@@ -44,40 +44,59 @@ pub(crate) fn tasks(records: &[Record]) -> Table {
 /// Table 3: the rows of one task in one variant.
 pub(crate) fn errors(group: &[&Record]) -> Table {
     let first = group[0];
-    let less = format!("less {}", first.method);
     let [hard, parameter] = first.titles.clone();
     let mut table = Table::new([
         "method".to_owned(),
         "setting".into(),
         hard,
-        less.clone(),
-        "best step".into(),
-        less,
+        format!("difference to {}", first.method),
+        "median".into(),
         parameter,
         "success".into(),
-        "in the paper's unit".into(),
-        "paper".into(),
     ]);
     let comparisons = group.iter().filter(|one| !one.varied).count() - 1;
     for one in group {
-        let less = |errors: &[f64], reference: &[f64]| match one.method == first.method {
+        let to_first = match one.method == first.method {
             true => String::new(),
-            false => difference(comparisons, errors, reference),
+            false => difference(comparisons, &one.returned, &first.returned),
         };
-        let printed = one.task().paper().printed(&one.family, one.original);
         let star = if one.chosen { "" } else { " *" };
         table.push([
             one.method.clone(),
             format!("{}{star}", one.setting),
-            with_interval(&one.last),
-            less(&one.last, &first.last),
-            short(mean(&one.returned)),
-            less(&one.returned, &first.returned),
+            with_interval(&one.returned),
+            to_first,
+            short(median(&one.returned)),
             with_interval(&one.parameter),
             format!("{:.0} %", 100.0 * one.success_rate()),
-            pair(one.in_papers_unit),
-            printed.map(pair).unwrap_or_default(),
         ]);
+    }
+    table
+}
+
+/// Table 3 as the paper prints it, for its softnesses: ours has a fixed width, or one that narrows.
+fn paper(records: &[Record]) -> Table {
+    let mut table =
+        Table::new(["task", "variant", "softness", "paper", "ours, static", "ours, decay"]);
+    for group in by_variant(records) {
+        let first = group[0];
+        for (family, _) in first.task().paper().table3 {
+            let printed = first.task().paper().printed(family, first.original);
+            let ours = |end: &str| {
+                let of = |one: &&&Record| {
+                    !one.varied && one.family == *family && one.method.ends_with(end)
+                };
+                group.iter().find(of).map_or(String::new(), |one| pair(one.in_papers_unit))
+            };
+            table.push([
+                first.task().title().to_owned(),
+                first.variant().to_owned(),
+                (*family).to_owned(),
+                printed.map(pair).unwrap_or_default(),
+                ours(" static"),
+                ours(" decay"),
+            ]);
+        }
     }
     table
 }
@@ -151,7 +170,7 @@ fn poses(records: &[Record]) -> Table {
         "seeds",
         "failing",
         "returned",
-        "less preset",
+        "difference to preset",
         "median",
         "mean of the rest",
         "s a run",
@@ -162,15 +181,16 @@ fn poses(records: &[Record]) -> Table {
             let returned = &one.returned;
             let (fails, rest): (Vec<f64>, Vec<f64>) = returned.iter().partition(|x| **x > FAILS);
             let [low, high] = wilson_interval(fails.len(), returned.len()).map(|x| 100.0 * x);
-            let less = preset.filter(|preset| preset.method != one.method);
-            let less = less.map(|preset| difference(group.len() - 1, returned, &preset.returned));
+            let other = preset.filter(|preset| preset.method != one.method);
+            let to_preset =
+                other.map(|preset| difference(group.len() - 1, returned, &preset.returned));
             table.push([
                 one.variant().to_owned(),
                 one.method.clone(),
                 returned.len().to_string(),
                 format!("{} ({low:.1} to {high:.1} %)", fails.len()),
                 with_interval(returned),
-                less.unwrap_or_default(),
+                to_preset.unwrap_or_default(),
                 short(median(returned)),
                 short(mean(&rest)),
                 short(one.seconds),
@@ -194,7 +214,7 @@ fn pair(errors: [Option<f64>; 2]) -> String {
     errors.into_iter().flatten().map(short).collect::<Vec<_>>().join(" / ")
 }
 
-/// The table of this name: `tasks`, `summary`, `seconds`, `poses`, `crossed`, or `errors TASK VARIANT`; none if there is nothing to show.
+/// The table of this name: `tasks`, `summary`, `paper`, `seconds`, `poses`, `crossed`, or `errors TASK VARIANT`; none if there is nothing to show.
 ///
 /// # Errors
 ///
@@ -204,6 +224,7 @@ pub(crate) fn named(records: &[Record], name: &str) -> anyhow::Result<Option<Tab
     Ok(match words[..] {
         ["tasks"] => Some(tasks(records)),
         ["summary"] => Some(summary(records)),
+        ["paper"] => Some(paper(records)),
         ["seconds"] => Some(seconds(records)),
         ["poses"] => Some(poses(records)),
         ["crossed"] => crate::crossed::crossed(records),

@@ -19,7 +19,10 @@ fn a_comparison_is_not_done_twice() {
         let journal = out.path().join("runs.jsonl");
         let tables = fs::read_to_string(out.path().join("results.md")).unwrap();
         let report = fs::read_to_string(out.path().join("report.html")).unwrap();
-        assert!(report.contains("<svg") && out.path().join("results/profile.csv").exists());
+        assert!(
+            report.contains("<svg")
+                && out.path().join("results/occlusion-original-pareto.csv").exists()
+        );
         (tables, fs::read(journal).unwrap())
     };
     let first = compare();

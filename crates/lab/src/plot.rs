@@ -55,28 +55,12 @@ pub struct Series {
     pub dashed: bool,
     /// Points of a line; a single one is drawn as a mark.
     pub points: Vec<[f64; 2]>,
-    /// Shape of a single point.
-    pub mark: Mark,
     /// Lower and upper end at every point, or nothing.
     pub band: Vec<[f64; 2]>,
     /// Whether its dots are ringed.
     pub marked: bool,
     /// Whether its dots are boxed.
     pub boxed: bool,
-}
-
-/// Shape of a single point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mark {
-    /// A disc.
-    #[default]
-    Dot,
-    /// A triangle.
-    Triangle,
-    /// A cross.
-    Cross,
-    /// A square.
-    Square,
 }
 
 impl Series {
@@ -89,15 +73,7 @@ impl Series {
     fn mark_at<DB: DrawingBackend>(&self, at: (i32, i32)) -> DynElement<'static, DB, (i32, i32)> {
         let colour = self.rgb();
         let style = if self.dashed { colour.stroke_width(2) } else { colour.filled() };
-        match self.mark {
-            Mark::Dot => Circle::new(at, 5, style).into_dyn(),
-            Mark::Triangle => TriangleMarker::new(at, 6, style).into_dyn(),
-            Mark::Square => {
-                let corners = [(at.0 - 4, at.1 - 4), (at.0 + 4, at.1 + 4)];
-                Rectangle::new(corners, style).into_dyn()
-            }
-            Mark::Cross => Cross::new(at, 5, colour.stroke_width(2)).into_dyn(),
-        }
+        Circle::new(at, 5, style).into_dyn()
     }
 }
 

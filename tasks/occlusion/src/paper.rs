@@ -5,8 +5,8 @@ pub(crate) const PAPER: Paper = Paper {
     freedom: ["3", "8"],
     runs: [50, 5],
     note: "Paper's unit: the mean squared error of the soft image, and, as we guess, the number of pairs in the wrong order.\nThe \
-           released blending depends on the order of faces; ours is Eq. 4 with exact derivatives. Of the transfer only the\nfront quad \
-           is asked for. The paper's rows Exp and Gamma are identical: their weights are 1 at every depth.",
+           released blending depends on the order of faces; ours is Eq. 4 with exact derivatives. The transfer scores the\nfront quad \
+           only. The paper's rows Exp and Gamma are identical: their weights are 1 at every depth.",
     table3: &[
         ("mlp", [[0.041, 0.244], [0.040, 1.63]]),
         ("gauss", [[0.049, 0.962], [0.058, 7.63]]),

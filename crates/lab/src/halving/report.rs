@@ -6,7 +6,7 @@ use super::{Halving, SearchAxis, SearchSpace, Setting, Trial, better_first};
 use crate::{
     format::{exact, line, short, short_or_none},
     mean, mean_interval,
-    plot::{Axis, Mark, Plot, Series},
+    plot::{Axis, Plot, Series},
     report::{Report, Table},
 };
 
@@ -152,15 +152,9 @@ impl Halving {
             let points = of_round.filter_map(|trial| Some([trial.setting[axis]?, trial.mean()?]));
             let mut name = format!("round {round}");
             for point in points {
-                let (name, mark) = (std::mem::take(&mut name), Mark::Dot);
+                let name = std::mem::take(&mut name);
                 let colour = ROUND_COLOURS[(round - 1) % ROUND_COLOURS.len()];
-                plot.series.push(Series {
-                    name,
-                    colour,
-                    points: vec![point],
-                    mark,
-                    ..Series::default()
-                });
+                plot.series.push(Series { name, colour, points: vec![point], ..Series::default() });
             }
         }
         (!plot.series.is_empty()).then_some(plot)
