@@ -6,7 +6,7 @@ import { Playground } from "./play.js";
 import { Solver } from "./solver.js";
 
 const MESHES = /\.(obj|ply|stl|off|glb|gltf)$/i;
-const TABS = ["pose", "shape", "play"];
+const TABS = ["play", "pose", "shape"];
 
 const error = document.querySelector("#error");
 const say = (line) => (error.textContent = line);
@@ -23,12 +23,15 @@ const engine = new Engine({
 /** Opens the tab that the address names, with its settings. */
 async function route() {
   const told = link.read();
-  const name = TABS.includes(told.tab) ? told.tab : "pose";
+  const name = TABS.includes(told.tab) ? told.tab : TABS[0];
   if (name !== current) {
+    const isOpened = current === null;
     await tabs[current]?.leave?.();
     current = name;
     for (const each of TABS) section(each).hidden = each !== name;
-    for (const a of document.querySelectorAll("nav a")) a.toggleAttribute("aria-current", a.dataset.tab === name);
+    for (const a of document.querySelectorAll("[data-tab]")) a.toggleAttribute("aria-current", a.dataset.tab === name);
+    // A link to a tab opens the page there, the bare address at the top.
+    if (isOpened && told.tab) document.querySelector(".tabs").scrollIntoView();
     say("");
   }
   const first = !tabs[name].entered;

@@ -1,7 +1,7 @@
 // The page in a real browser: `node --test tests/page.test.mjs`, after `./build`. Chromium is CHROMIUM or /usr/bin/chromium.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
+import { access, readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { SOFTWARE_GPU, ended, launch, opened, serve, status } from "./browser.mjs";
 import { disc, large, meshes, png } from "./files.mjs";
@@ -203,11 +203,36 @@ onPage("the playground answers to keys, softness and T-conorm", "#tab=play&count
   assert.equal(await error(page), "");
 });
 
-onPage("nothing moves by itself where motion is to be reduced", "", async (page) => {
+onPage("nothing moves by itself where motion is to be reduced", "#tab=pose", async (page) => {
   await page.waitForFunction(() => document.querySelector("#pose .status").textContent.includes("Step 0 of 300"));
   await page.waitForTimeout(500);
   assert.match(await status(page).textContent(), /Step 0 of 300/);
 }, { reducedMotion: "reduce" });
+
+for (const [device, width, height] of [["laptop", 1280, 800], ["phone", 390, 844]]) {
+  onPage(`the first screen of a ${device} has three doors and the start of the playground`, "", async (page) => {
+    const bottom = async (selector, edge = "bottom") => page.locator(selector).first().evaluate((element, edge) => element.getBoundingClientRect()[edge], edge);
+    assert.deepEqual(await page.locator(".doors h2").allTextContents(), ["I have masks", "I use torch", "I write Rust"]);
+    assert.ok(await bottom(".doors section:last-child") < height, "all doors are visible");
+    assert.ok(await bottom("#play .stage", "top") < height - 100, "the playground begins");
+    assert.equal(await page.evaluate(() => scrollY), 0);
+  }, { viewport: { width, height } });
+}
+
+onPage("a link to a tab shows the tab", "#tab=pose&steps=2", async (page) => {
+  await ended(page);
+  const top = await page.locator("nav.tabs").evaluate((element) => element.getBoundingClientRect().top);
+  assert.ok(Math.abs(top) < 2, `the tabs are at ${top}`);
+}, { viewport: { width: 390, height: 844 } });
+
+test("links to the documentation lead to pages that exist", async () => {
+  const page = await readFile(new URL("../page/index.html", import.meta.url), "utf8");
+  const linked = [...page.matchAll(/href="https:\/\/github\.com\/softrast\/softrast\/blob\/main\/([^"#]+)"/g)].map((link) => link[1]);
+  assert.ok(linked.length >= 8, `${linked}`);
+  for (const file of linked) await access(new URL(`../../${file}`, import.meta.url));
+  const built = await readFile(new URL("../dist/index.html", import.meta.url), "utf8");
+  for (const [, file] of built.matchAll(/href="(book\/[^"#]+)"/g)) await access(new URL(`../dist/${file}`, import.meta.url));
+});
 
 onPage("all tabs fit on a phone", "#tab=pose&steps=2&with=logistic", async (page) => {
   for (const tab of ["pose", "shape", "play"]) {
