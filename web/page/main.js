@@ -40,7 +40,7 @@ async function route() {
   const anew = Object.keys(told).length > 1;
   if (first || anew) tabs[name].settings = told;
   await tabs[name].enter({ runs: (first || anew) && !matchMedia("(prefers-reduced-motion: reduce)").matches, anew });
-  if (anew && (told.mesh || told.target)) say(`This link was made with files that it does not hold: open ${[told.mesh, told.target].filter(Boolean).join(" and ")} again.`);
+  if (anew && (told.mesh || told.target)) say(`This link refers to files that it does not hold: open ${[told.mesh, told.target].filter(Boolean).join(" and ")} again.`);
 }
 
 function drops() {

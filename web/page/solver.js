@@ -461,7 +461,7 @@ export class Solver {
       const curves = found.flatMap(({ curves }, k) => curves.map((values, j) => ({ colour: RUNS[k], values, dash: j ? [5, 4] : [] })));
       softnessChart(this.canvases(null, "curve"), { curves, reach: REACH / pixel });
       found.forEach(({ width, moves, feedback, curves }, k) => {
-        const how = feedback ? "Its width follows what the run sees, and a run that is stuck begins again." : moves ? "Its width moves over the run." : "Its width stays.";
+        const how = feedback ? "Its width follows the error of the run, and a run that stalls restarts." : moves ? "Its width moves over the run." : "Its width is fixed.";
         chosen[k].hint.textContent = how + (curves.length > 1 ? " Dashed: what the gradient is taken of." : "");
         if (k === 0) slider.nextElementSibling.textContent = `${(width / pixel).toFixed(2)} px`;
       });
