@@ -10,10 +10,6 @@ const CELL: f64 = 2.0;
 const MOST_CELLS: f64 = 1024.0;
 /// A face in more cells than this is compared with all others.
 const SPREAD: usize = 64;
-/// Rounds of smoothing that may separate crossing faces, and means taken in each.
-const ROUNDS: usize = 12;
-const MEANS: usize = 3;
-
 /// A face with its box.
 struct Place {
     low: [f64; 3],
@@ -90,56 +86,6 @@ impl Mesh {
         pairs.dedup();
         pairs
     }
-
-    /// The mesh with vertices around faces that pass through each other moved to the mean of their neighbours, in ever larger
-    /// surroundings, until no faces do or twelve rounds are over. The other vertices stay.
-    #[must_use]
-    pub fn without_self_intersections(mut self) -> Self {
-        let mut neighbours = Vec::new();
-        for round in 0..ROUNDS {
-            let crossing = self.self_intersections();
-            if crossing.is_empty() {
-                break;
-            }
-            if neighbours.is_empty() {
-                neighbours = neighbours_of(self.faces(), self.positions().len());
-            }
-            let mut moves = vec![false; neighbours.len()];
-            for face in crossing.as_flattened() {
-                self.faces()[*face as usize].iter().for_each(|&v| moves[v as usize] = true);
-            }
-            for _ in 0..round / 2 {
-                let before = moves.clone();
-                for (v, around) in neighbours.iter().enumerate() {
-                    moves[v] |= around.iter().any(|&n| before[n as usize]);
-                }
-            }
-            let mut places = self.positions().to_vec();
-            for _ in 0..MEANS {
-                let before = places.clone();
-                for (v, around) in neighbours.iter().enumerate().filter(|&(v, _)| moves[v]) {
-                    let mean =
-                        |k: usize| around.iter().map(|&n| before[n as usize][k]).sum::<f64>();
-                    places[v] = [0, 1, 2].map(|k| mean(k) / around.len() as f64);
-                }
-            }
-            self = self.with_positions(places).expect("means of finite positions are finite");
-        }
-        self
-    }
-}
-
-/// Vertices that share an edge with each; none is its own.
-fn neighbours_of(faces: &[[u32; 3]], vertices: usize) -> Vec<Vec<u32>> {
-    let mut neighbours = vec![Vec::new(); vertices];
-    for &[a, b, c] in faces {
-        for (from, to) in [(a, b), (b, c), (c, a), (b, a), (c, b), (a, c)] {
-            if from != to && !neighbours[from as usize].contains(&to) {
-                neighbours[from as usize].push(to);
-            }
-        }
-    }
-    neighbours
 }
 
 /// Whether two triangles pass through each other, given by the numbers and the places of their corners.
@@ -209,19 +155,6 @@ mod tests {
         }
         assert!(crossing.len() > 50);
         assert_eq!(crossing, all);
-    }
-
-    #[test]
-    fn a_vertex_that_is_pulled_through_the_surface_comes_back() {
-        let ball = icosphere(3);
-        let mut places = ball.positions().to_vec();
-        places[5] = places[5].map(|x| -1.2 * x);
-        let tangled = ball.with_positions(places).unwrap();
-        assert!(!tangled.self_intersections().is_empty());
-        let free = tangled.clone().without_self_intersections();
-        assert!(free.self_intersections().is_empty());
-        let moved = free.positions().iter().zip(tangled.positions()).filter(|(a, b)| a != b);
-        assert!(moved.count() < 200);
     }
 
     #[test]

@@ -45,6 +45,7 @@ mod ply_header;
 mod polygon;
 mod read;
 mod remesh;
+mod separated;
 mod solid;
 mod statements;
 mod stl;
