@@ -80,7 +80,7 @@ mod tests {
             format!("before\n<!-- table {name} -->\n| old |\n<!-- end of table -->\nafter\n")
         };
         for (name, row) in [
-            ("errors pose original", "| preset | scale 0.1 | 0.200 ("),
+            ("errors pose original", "| preset | scale 0.1 | 0.150 ("),
             ("summary of results/cells.jsonl", "| POSE | 2 | 0.150 |  |  |"),
             ("seconds", "| POSE | original | preset | 0.500 | 1.67 |"),
         ] {
