@@ -76,7 +76,7 @@ pub use problem::{InverseProblem, SolveConfig};
 pub use remeshing_adam::RemeshingAdam;
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
-pub use save_picture::save_picture;
+pub use save_picture::{save_colour_picture, save_picture};
 pub use schedule::{Feedback, Follower, Place, ScaleSchedule, ScheduledSoftness, Surrogate};
 pub use silhouette_pixels::silhouette_pixels;
 pub use softness_file::{DepthSoftnessFile, NameOrFile, NamedSoftness, SoftnessFileError};

@@ -5,7 +5,7 @@ pub use softrast_inverse::{
     InverseProblem, Iterate, LearnConfig, Method, Minimization, NamedSoftness, PoseProblem,
     ScheduledSoftness, SoftnessAt, SolveConfig, Surface, VertexModel, learn, minimize,
     pose::{FoundPose, PoseSearch},
-    save_picture,
+    save_colour_picture, save_picture,
 };
 pub use softrast_mesh::{Mesh, MeshError};
 #[cfg(feature = "inverse")]
