@@ -97,6 +97,8 @@ pub(crate) struct Drawn<'a> {
 }
 
 /// The faces that reach each band of rows, for all views.
+///
+/// The example of the [crate](crate) makes them once for all passes.
 #[derive(Debug)]
 pub struct Bands {
     pub(crate) views: Vec<View>,

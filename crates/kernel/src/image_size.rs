@@ -4,6 +4,15 @@
 /// One pixel is `2 / shorter` wide and high.
 ///
 /// A number converts to a square image, `[height, width]` to any other.
+///
+/// ```
+/// use softrast_kernel::ImageSize;
+///
+/// let size: ImageSize = [2, 4].into();
+/// assert_eq!((size.shorter(), size.pixels()), (2, 8));
+/// // A pixel is 1 NDC wide; the first row is at the top.
+/// assert_eq!((size.column_centre(0), size.row_centre(0)), (-1.5, 0.5));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageSize {
     /// Rows.

@@ -50,6 +50,16 @@ macro_rules! lanes {
 pub(crate) use lanes;
 
 /// `f32` or `f64`, with access to the bits that index the profile table.
+///
+/// ```
+/// use softrast_kernel::Float;
+///
+/// fn mean<F: Float>(numbers: &[F]) -> F {
+///     let sum = numbers.iter().fold(F::ZERO, |sum, &x| sum + x);
+///     sum / F::from_f64(numbers.len() as f64)
+/// }
+/// assert_eq!((mean(&[1.0_f32, 2.0]), mean(&[1.0_f64, 2.0])), (1.5, 1.5));
+/// ```
 pub trait Float:
     Copy
     + Send

@@ -9,7 +9,7 @@
 //! The profile of a softness `s` is its optical depth `-ln(1 - s)`: the coverage of a pixel is `1 - exp(-sum)`.
 //!
 //! ```
-//! use softrast_kernel::{Grid, Inputs, Kernels, bands_of_view};
+//! use softrast_kernel::{Bands, Grid, Inputs, Kernels, bands_of_view};
 //!
 //! // The logistic of scale 0.05 NDC, drawn up to 12 scales from the edge.
 //! let grid = Grid { outer: 0.6, inner: 0.6, from: [0.0; 2], octaves: 24, far: 0, bits: 4 };
@@ -20,7 +20,7 @@
 //! let (faces, size, views) = ([[0, 1, 2]], [8, 8].into(), 1);
 //! let bands = bands_of_view(views, size);
 //! let inputs = Inputs { vertices: &vertices, table: &table, faces: &faces, grid, size, near: 0.01, culls: false, views, bands };
-//! let lists = f64::bands(&inputs); // serve all passes over the same vertices
+//! let lists: Bands = f64::bands(&inputs); // serve all passes over the same vertices
 //!
 //! // Forward: the sums [views, height, width].
 //! let sums = f64::sums(&inputs, &lists);
@@ -100,4 +100,4 @@ pub use tasks::{recorded_tasks, task};
 /// Compiles and runs the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-pub struct Readme;
+struct Readme;

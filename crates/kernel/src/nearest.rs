@@ -9,6 +9,14 @@ const GROUP: usize = 8;
 ///
 /// The middle point of a range splits it along one axis: those before it are not beyond it, those
 /// after it are not before it. Source: Bentley 1975.
+///
+/// ```
+/// use softrast_kernel::Nearest;
+///
+/// let [two, one] = [vec![[0.0; 3], [2.0, 0.0, 0.0]], vec![[0.0; 3]]].map(Nearest::new);
+/// // Only one of the two points is away from the other set, by 2.
+/// assert_eq!((two.mean_squared_distance(&one), one.mean_squared_distance(&two)), (2.0, 0.0));
+/// ```
 pub struct Nearest {
     /// Neighbours in this order are mostly neighbours in space.
     points: Vec<[f64; 3]>,

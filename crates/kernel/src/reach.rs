@@ -25,6 +25,13 @@ pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: ImageSize) -
 }
 
 /// Whether corners given in NDC, y up, are in clockwise order.
+///
+/// ```
+/// use softrast_kernel::is_seen_clockwise;
+///
+/// assert!(is_seen_clockwise([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]));
+/// assert!(!is_seen_clockwise([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]));
+/// ```
 pub fn is_seen_clockwise<F: Float>(corners: [[F; 2]; 3]) -> bool {
     let [[ax, ay], [bx, by], [cx, cy]] = corners.map(|corner| corner.map(F::to_f64));
     (bx - ax) * (cy - ay) < (by - ay) * (cx - ax)
@@ -87,6 +94,16 @@ pub(crate) fn within(band: Range<usize>, reach: Reach) -> Range<usize> {
 
 /// Calls `fill(row, start, end)` for the pixels whose centre a face over `vertices`
 /// `[3, vertices]` covers (edges included).
+///
+/// ```
+/// use softrast_kernel::inside_spans;
+///
+/// // The upper left half of 4 x 4 pixels: x, y and depth of three vertices.
+/// let vertices = [-1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 2.0, 2.0, 2.0];
+/// let mut spans = Vec::new();
+/// inside_spans(&vertices, &[0, 1, 2], 0.01, 4.into(), |row, start, end| spans.push((row, start, end)));
+/// assert_eq!(spans, [(0, 0, 4), (1, 0, 3), (2, 0, 2), (3, 0, 1)]);
+/// ```
 pub fn inside_spans<F: Float>(
     vertices: &[F],
     face: &[u32; 3],

@@ -149,6 +149,15 @@ impl<L: Lanes> Real for L {
 }
 
 /// Numbers with their derivatives along one direction of the inputs.
+///
+/// ```
+/// use softrast_kernel::Dual;
+///
+/// // x² + x and its derivative at 3.
+/// let x = Dual { value: 3.0, tangent: 1.0 };
+/// let y = x * x + x;
+/// assert_eq!((y.value, y.tangent), (12.0, 7.0));
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Dual<L> {
     /// The number.

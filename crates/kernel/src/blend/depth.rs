@@ -7,6 +7,8 @@ use crate::{
 };
 
 /// Source of the logarithm of a depth weight.
+///
+/// The [module](super) has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DepthGrid {
     /// A table of the negative logarithm over the squared distance from the near plane; nearer depths are on the outer side.

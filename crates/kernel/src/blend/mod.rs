@@ -3,6 +3,48 @@
 //! `C = (Σ wⱼ cⱼ + w c) / (Σ wⱼ + w)` with `ln wⱼ = ln s(dⱼ) + ln b(zⱼ)`, both from tables. Each band is walked once for the sums and once
 //! more for the gradient; before that, for the largest weight of each pixel if the weights may exceed the range of floats. As in the sums
 //! of profiles, the code is generic over `Real`.
+//!
+//! ```
+//! use softrast_kernel::{Grid, Kernels, blend::{DepthGrid, Inputs, Kept}};
+//!
+//! // Minus the logarithm of a logistic of scale 0.05 NDC, mirrored, and a weight of 1 at every depth.
+//! let edge = Grid { outer: 0.6, inner: 0.6, from: [0.0; 2], octaves: 24, far: 0, bits: 4 };
+//! let mut tables = edge.table(|d| [(d / 0.05).exp().ln_1p(), (1.0 + (-d / 0.05).exp()).recip() / 0.05]);
+//! tables.extend([0.0; 4]);
+//!
+//! // A white face in front of a black background of weight e⁻⁵.
+//! let inputs = Inputs {
+//!     vertices: &[-0.5, 0.5, 0.0, -0.5, -0.4, 0.5, 1.0, 1.0, 1.0],
+//!     attributes: &[1.0; 3],
+//!     tables: &tables,
+//!     background: &[0.0, -5.0],
+//!     texture: &[],
+//!     texture_size: None,
+//!     faces: &[[0, 1, 2]],
+//!     entries: &[[0, 1, 2]],
+//!     edge,
+//!     depth: DepthGrid::Exponential,
+//!     floor: 0.0,
+//!     planes: [0.5, 2.0],
+//!     size: 8.into(),
+//!     near: 0.01,
+//!     far: 100.0,
+//!     tolerance: 1e-3,
+//!     culls: false,
+//!     views: 1,
+//!     shared: true,
+//! };
+//! let kept: Kept<f64> = f64::kept(&inputs, false); // serves all passes over the same inputs
+//! let image = f64::blend(&inputs, &kept);
+//! let (white, share) = image.split_at(64);
+//! assert!(white[36] > 0.95 && white[0] < 1e-3);
+//! assert!(white.iter().zip(share).all(|(white, share)| (white - share).abs() < 1e-12));
+//!
+//! // Brighter corners brighten the image.
+//! let to_attributes = [false, true, false, false, false];
+//! let gradient = f64::blend_vjp(&inputs, &kept, &[1.0; 128], to_attributes);
+//! assert!(gradient.len() == 3 && gradient.iter().all(|&by_corner| by_corner > 0.0));
+//! ```
 #![allow(clippy::needless_range_loop)]
 
 mod band;
@@ -44,6 +86,8 @@ use super::{
 };
 
 /// Data shared by passes over the same inputs.
+///
+/// The [module](self) has an example.
 pub struct Kept<F> {
     reached: Reached,
     /// Sums of each band of each view, set by the first pass without tangents; empty if they are not cached.

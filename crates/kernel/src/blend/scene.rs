@@ -17,6 +17,13 @@ use crate::{
 pub const NOTHING: f64 = 1e-4;
 
 /// The logarithm of an edge softness above which it exceeds its floor by more than rounding errors; minus infinity without a floor.
+///
+/// ```
+/// use softrast_kernel::blend::counts_from;
+///
+/// assert_eq!(counts_from(0.0), f64::NEG_INFINITY);
+/// assert!(counts_from(1e-7) > 1e-7_f64.ln());
+/// ```
 pub fn counts_from(floor: f64) -> f64 {
     (floor / (1.0 - NOTHING)).ln()
 }

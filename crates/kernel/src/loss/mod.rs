@@ -42,6 +42,8 @@ pub fn bands_of_losses(views: usize, size: ImageSize) -> usize {
 }
 
 /// Images that silhouettes are compared with, each `[1 or views, height, width]`.
+///
+/// See [`PixelLoss`] for an example.
 #[derive(Clone, Copy)]
 pub struct Judged<'a, F> {
     /// The image that the coverage is compared with.

@@ -6,6 +6,27 @@ use crate::{float::Float, lanes::Lanes, real::splat};
 pub const EMPTY: f64 = 1e-6;
 
 /// The loss between a silhouette and its target.
+///
+/// ```
+/// use softrast_kernel::{Grid, Inputs, Judged, Kernels, PixelLoss, bands_of_losses};
+///
+/// let grid = Grid { outer: 0.6, inner: 0.6, from: [0.0; 2], octaves: 24, far: 0, bits: 4 };
+/// let table = grid.table(|d| [(d / 0.05).exp().ln_1p(), (1.0 + (-d / 0.05).exp()).recip() / 0.05]);
+/// let vertices = [-0.5, 0.5, 0.0, -0.5, -0.4, 0.5, 1.0, 1.0, 1.0];
+/// let (faces, size, views) = ([[0, 1, 2]], [8, 8].into(), 1);
+/// let bands = bands_of_losses(views, size);
+/// let inputs = Inputs { vertices: &vertices, table: &table, faces: &faces, grid, size, near: 0.01, culls: false, views, bands };
+/// let lists = f64::bands(&inputs);
+///
+/// // Without a target, the squared error is the mean of the squared coverage, and nothing overlaps.
+/// let judged = Judged { target: &[0.0; 64], counted: None };
+/// let [loss, gradient] = f64::losses(&inputs, &lists, judged, PixelLoss::SquaredError, true);
+/// let coverage = f64::sums(&inputs, &lists).into_iter().map(|sum| 1.0 - (-sum).exp());
+/// assert!((loss[0] - coverage.map(|a| a * a).sum::<f64>() / 64.0).abs() < 1e-12);
+/// // The topmost corner should sink.
+/// assert!(gradient[5] > 0.0);
+/// assert_eq!(f64::losses(&inputs, &lists, judged, PixelLoss::Iou, false)[0], [1.0]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelLoss {
     /// The mean over pixels of the squared difference.
