@@ -3,6 +3,14 @@
 use std::collections::BTreeMap;
 
 /// The edges of some faces, for losses that keep a surface smooth.
+///
+/// ```
+/// use softrast_mesh::Edges;
+///
+/// let edges = Edges::new(&[[0, 1, 2], [2, 1, 3]]);
+/// assert_eq!(edges.ends, [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]);
+/// assert_eq!(edges.hinges, [[1, 2, 0, 3]]);
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Edges {
     /// Both ends of every edge, the lower number first, in order.

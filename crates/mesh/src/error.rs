@@ -174,6 +174,13 @@ pub enum MeshError {
 }
 
 /// Errors at a place of a file.
+///
+/// ```
+/// use softrast_mesh::{Fault, Mesh, MeshError};
+///
+/// let error = Mesh::parse(b"v 0 0\nf 1 1 1", "a.obj").unwrap_err();
+/// assert!(matches!(error, MeshError::Line { line: 1, reason: Fault::Coordinates(2), .. }));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
     /// A vertex with fewer than three coordinates.

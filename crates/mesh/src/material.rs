@@ -7,6 +7,19 @@ use crate::MeshError;
 /// The colours of faces: a picture if there is one, else the colours of the vertices, times a factor.
 ///
 /// The picture is stored as the content of its file, PNG or JPEG. It is not decoded here, so it may be corrupt.
+///
+/// ```
+/// use softrast_mesh::{Material, Texture};
+///
+/// let red = Material::default().with_factor([1.0, 0.0, 0.0])?;
+/// let corners = vec![[0, 1, 2], [2, 1, 3]];
+/// let texture = Texture::new(vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], corners)?
+///     .with_materials(vec![Material::default(), red], vec![0, 1])?;
+/// let of_second = texture.of_faces()[1] as usize;
+/// assert_eq!(texture.materials()[of_second].factor(), [1.0, 0.0, 0.0]);
+/// assert!(Material::default().with_picture(*b"GIF89a").is_err());
+/// # Ok::<(), softrast_mesh::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     picture: Option<Arc<[u8]>>,
@@ -78,6 +91,14 @@ pub fn to_linear(x: f64) -> f64 {
 }
 
 /// Converts a channel of linear light to sRGB; both from 0 to 1. The inverse of [`to_linear`].
+///
+/// ```
+/// use softrast_mesh::{from_linear, to_linear};
+///
+/// let half = from_linear(0.5);
+/// assert!((half - 0.735).abs() < 1e-3);
+/// assert!((to_linear(half) - 0.5).abs() < 1e-9);
+/// ```
 ///
 /// Source: IEC 61966-2-1 (sRGB).
 pub fn from_linear(x: f64) -> f64 {

@@ -12,6 +12,20 @@ use crate::{
 /// repeated corner, or no area), vertices may be duplicated or unused, and the surface may be open: such meshes can be rendered.
 ///
 /// A mesh may have a colour at each vertex; then every channel is in [0, 1]. It may have a [`Texture`] on its faces.
+///
+/// ```
+/// use softrast_mesh::Mesh;
+///
+/// let flat = Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])?;
+/// assert_eq!(flat.subdivided().faces().len(), 4);
+/// let larger = flat.triangles().flatten().map(|p| p.map(|x| 2.0 * x)).collect();
+/// let larger = flat.with_positions(larger)?;
+/// assert_eq!((flat.area(), larger.area()), (0.5, 2.0));
+/// let red = larger.with_colours(vec![[1.0, 0.0, 0.0]; 3])?;
+/// assert_eq!(Mesh::parse(red.to_obj().as_bytes(), "red.obj")?, red);
+/// assert_eq!(Mesh::parse(&red.to_ply(), "red.ply")?, red);
+/// # Ok::<(), softrast_mesh::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     positions: Vec<[f64; 3]>,

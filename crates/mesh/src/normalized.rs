@@ -8,6 +8,16 @@ impl Mesh {
     /// The box is that of [`Mesh::bounds`]: an unused vertex is ignored, and is clamped to the box from -1 to 1 so that it stays finite at
     /// any scale. A mesh without extent is only moved to the origin.
     ///
+    /// ```
+    /// use softrast_mesh::{airplane, chair, painted_fox};
+    ///
+    /// for mesh in [airplane(), chair(), painted_fox()] {
+    ///     let [low, high] = mesh.normalized().bounds();
+    ///     let sides = [0, 1, 2].map(|k| high[k] - low[k]);
+    ///     assert_eq!(sides.into_iter().fold(0.0, f64::max), 2.0);
+    /// }
+    /// ```
+    ///
     /// Source: the normalisation of `GenDR`'s loader, with its box centre and one scale for all axes.
     #[must_use]
     pub fn normalized(&self) -> Mesh {

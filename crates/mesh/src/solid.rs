@@ -19,6 +19,16 @@ impl Mesh {
     /// `field` is negative inside the solid, and increases approximately like a distance. Parts of the solid that reach the sides of the
     /// box are cut off half a cell before them.
     ///
+    /// ```
+    /// use softrast_mesh::Mesh;
+    ///
+    /// let ball = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt() - 0.8;
+    /// let ball = Mesh::of_solid([[-1.0; 3], [1.0; 3]], 20, ball)?;
+    /// let area = 4.0 * std::f64::consts::PI * 0.8 * 0.8;
+    /// assert!((ball.area() / area - 1.0).abs() < 0.03);
+    /// # Ok::<(), softrast_mesh::MeshError>(())
+    /// ```
+    ///
     /// # Errors
     ///
     /// If the box contains no part of the solid, or has no extent.

@@ -39,6 +39,18 @@ impl Mesh {
 
     /// The translation of the node in [`Mesh::to_glb`], in world units: approximately the middle of the mesh if 32 bits would round
     /// coordinates by more than 1e-5 of its longest side, as on a map, else zeros.
+    ///
+    /// ```
+    /// use softrast_mesh::{Mesh, icosphere};
+    ///
+    /// let ball = icosphere(1);
+    /// let on_map = ball.positions().iter().map(|&[x, y, z]| [x + 4e5, y + 5e6, z]).collect();
+    /// let on_map = ball.with_positions(on_map)?;
+    /// assert_eq!((ball.glb_origin(), on_map.glb_origin()), ([0.0; 3], [4e5, 5e6, 0.0]));
+    /// let back = Mesh::parse(&on_map.to_glb(), "map.glb")?;
+    /// assert!((back.bounds()[1][0] - on_map.bounds()[1][0]).abs() < 1e-6);
+    /// # Ok::<(), softrast_mesh::MeshError>(())
+    /// ```
     pub fn glb_origin(&self) -> [f64; 3] {
         glb_writer::origin(self)
     }

@@ -14,9 +14,14 @@ const AT_ONCE: usize = 1 << 11;
 ///
 /// let ball = icosphere(3);
 /// let positions = ball.positions().iter().flatten().map(|&x| x as f32).collect();
-/// let surface = SurfaceGeometry::new(ball.faces(), positions);
-/// // The normal of a unit sphere is the position.
+/// let mut surface = SurfaceGeometry::new(ball.faces(), positions);
+/// // The normal of a unit sphere is the position, and the mean of the neighbours is further inside.
 /// assert!(surface.normals().iter().zip(surface.positions()).all(|(n, p)| (n - p).abs() < 0.02));
+/// let inwards = surface.umbrella(surface.positions());
+/// assert!(inwards.iter().zip(surface.positions()).map(|(d, p)| d * p).sum::<f32>() < 0.0);
+/// let area = surface.area(ball.faces());
+/// surface.move_to(ball.faces(), surface.positions().iter().map(|x| 2.0 * x).collect());
+/// assert!((surface.area(ball.faces()) / area - 4.0).abs() < 1e-4);
 /// ```
 #[derive(Clone, Debug)]
 pub struct SurfaceGeometry {

@@ -46,6 +46,17 @@ pub struct ClosedSurface {
 }
 
 /// Numbers of changes of a pass over a surface.
+///
+/// ```
+/// use softrast_mesh::{Changes, ClosedSurface, icosphere};
+///
+/// let mut sphere = ClosedSurface::new(&icosphere(2), 0.1, 0)?;
+/// let Changes { split, .. } = sphere.remesh(10_000);
+/// assert!(split > 0);
+/// sphere.set_length(1.0);
+/// assert!(sphere.remesh(10_000).collapsed > 0);
+/// # Ok::<(), softrast_mesh::MeshError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Changes {
     /// Collapsed edges.
