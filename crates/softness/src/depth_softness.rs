@@ -15,6 +15,19 @@ use crate::{
 ///
 /// Source: Wu et al. 2024, Eq. 3 and 4. Not in the paper: the position of a family's edge. The released code has it at nearness 0, where
 /// the reversed families are 1 for every face and narrow ones saturate, so that depths are not distinguished.
+///
+/// ```
+/// use softrast_softness::{DepthSoftness, UnknownDepthSoftness};
+/// use softrast_tensor::{NdArray, numbers, vector};
+///
+/// let exp: DepthSoftness = "exp".parse()?;
+/// let phi = vector::<NdArray>(&exp.default_phi(0.25));
+/// // A quarter of the distance between the planes divides the weight by e.
+/// let log = numbers(exp.log_weight(phi, vector(&[0.75, 0.5])));
+/// assert!((log[0] - log[1] - 1.0).abs() < 1e-6);
+/// assert_eq!("depth_mlp".parse(), Ok(DepthSoftness::Mlp));
+/// # Ok::<(), UnknownDepthSoftness>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum DepthSoftness {

@@ -107,6 +107,15 @@ impl Softness for Family {
 }
 
 /// No softness family has this name.
+///
+/// ```
+/// use softrast_softness::{Family, UnknownFamily};
+///
+/// let family: Family = "gamma".parse()?;
+/// assert_eq!((family, family.mirrored()), (Family::Gamma, Family::GammaForward));
+/// assert_eq!("sigmoid".parse::<Family>(), Err(UnknownFamily { found: "sigmoid".into() }));
+/// # Ok::<(), UnknownFamily>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown softness {found:?}; known are {}", Family::ALL.map(Family::name).join(", "))]
 pub struct UnknownFamily {

@@ -51,4 +51,4 @@ pub use truncated::Truncated;
 /// Compiles and runs the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-pub struct Readme;
+struct Readme;

@@ -5,6 +5,18 @@ use crate::{Softness, softness::curve};
 /// The mirrored step `1 - s(-x)` of a softness, with the same parameters.
 ///
 /// Its optical depth is `-ln s(-x)`: the table of a weight is a table of this optical depth.
+///
+/// ```
+/// use softrast_softness::{Family, Mirrored, Softness};
+/// use softrast_tensor::{NdArray, numbers, vector};
+///
+/// fn at(softness: impl Softness, x: f64) -> f64 {
+///     let phi = vector::<NdArray>(&softness.default_phi(0.1));
+///     numbers(softness.value(phi, vector(&[x])))[0]
+/// }
+/// let (mirrored, other) = (Mirrored(Family::GumbelMax), Family::GumbelMin);
+/// assert!((at(mirrored, 0.05) - at(other, 0.05)).abs() < 1e-6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mirrored<S>(pub S);
 

@@ -12,6 +12,17 @@ use crate::{EdgeSoftness, Softness};
 ///
 /// All other code of this library takes φ as an explicit vector; this type wraps softness and φ for burn's optimisers and recorders. The
 /// family is not recorded: loading a record keeps that of the module it is loaded into.
+///
+/// ```
+/// use softrast_softness::{EdgeSoftness, Family, SoftStep, Softness};
+/// use softrast_tensor::{DType, NdArray, burn::module::Module, numbers, vector};
+///
+/// let softness = EdgeSoftness::new(Family::Logistic);
+/// let phi = softness.default_phi(0.02);
+/// let step = SoftStep::<NdArray>::new(softness, &phi, DType::F32, &Default::default());
+/// assert_eq!(numbers(step.forward(vector(&[0.0, 1.0]))), [0.5, 1.0]);
+/// assert_eq!(step.num_params(), 1);
+/// ```
 #[derive(Module, Debug)]
 pub struct SoftStep<B: Backend> {
     /// The parameters φ, `[parameters]`.

@@ -17,6 +17,16 @@ const FINE: usize = 128;
 const REFINEMENTS: usize = 4;
 
 /// The interval between `-outer` and `inner`, outside of which an optical depth is at its limits.
+///
+/// ```
+/// use softrast_softness::{Family, Softness, Support, support};
+/// use softrast_tensor::NdArray;
+///
+/// let phi = Family::Uniform.default_phi(0.1);
+/// let Support { outer, inner, left, .. } =
+///     support::<NdArray>(&Family::Uniform, &phi, 1e-6, &Default::default());
+/// assert!((outer - 0.1).abs() < 1e-6 && (inner - 0.1).abs() < 1e-6 && left == 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Support {
     /// Beyond this distance outside, the optical depth differs from `left` by at most the excess. Infinite if that is not reached within
@@ -65,6 +75,13 @@ pub fn support<B: Backend>(
 ///
 /// `curve` returns the values at distances in [1e-12, 1e6]; it is sampled at 1024 of them, and the last one that is not settled is then
 /// refined to 2e-10 relative; the settled end of the interval is returned. A bump narrower than 4 % of its distance can be missed.
+///
+/// ```
+/// use softrast_softness::settled_beyond;
+///
+/// let halved = settled_beyond(|x| x.iter().map(|x| (-x).exp()).collect(), |y| y < 0.5);
+/// assert!((halved - 2_f64.ln()).abs() < 1e-9);
+/// ```
 pub fn settled_beyond(curve: impl Fn(&[f64]) -> Vec<f64>, settled: impl Fn(f64) -> bool) -> f64 {
     let mut found = Interval { start: NEAREST, end: FARTHEST };
     for count in std::iter::once(COARSE).chain([FINE; REFINEMENTS]) {

@@ -1,4 +1,25 @@
 //! The families of soft steps, one per file. [`Family`](crate::Family) selects one by name.
+//!
+//! ```
+//! use softrast_softness::{Softness, families::*};
+//! use softrast_tensor::{NdArray, numbers, vector};
+//!
+//! /// The coverage at a distance, for scale 1.
+//! fn at(softness: impl Softness, x: f64) -> f64 {
+//!     let phi = vector::<NdArray>(&softness.default_phi(1.0));
+//!     numbers(softness.value(phi, vector(&[x])))[0]
+//! }
+//! let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-5, "{a}, not {b}");
+//!
+//! // Symmetric families cover one half at the edge.
+//! let halves = [at(Uniform, 0.0), at(CubicHermite, 0.0), at(Wigner, 0.0), at(Laplace, 0.0), at(Bilogit, 0.0), at(Mlp, 0.0)];
+//! halves.into_iter().for_each(|half| near(half, 0.5));
+//! // Tails end, or decrease exponentially or like 1 / |x|.
+//! assert!(at(Uniform, -9.0) == 0.0 && at(Gudermannian, -9.0) < 1e-3 && at(Reciprocal, -9.0) > 1e-2);
+//! // Reversed laws are 1 inside; the two Gumbel laws mirror one another.
+//! assert_eq!((at(Reversed(Gamma), 0.1), at(Reversed(Levy), 0.1)), (1.0, 1.0));
+//! near(at(GumbelMin, 0.3), 1.0 - at(GumbelMax, -0.3));
+//! ```
 
 mod bilogit;
 mod cauchy;
