@@ -15,6 +15,10 @@ use softrast_tensor::{Backend, Tensor};
 /// let faces = [[0, 1, 2], [2, 1, 3]];
 /// let colours = Tensor::<NdArray, 3>::zeros([1, 4, 3], &Default::default()); // red, green and blue of four vertices
 /// assert_eq!(Attributes::of_vertices(colours, &faces).channels(), 3);
+/// // One entry for each of two faces, and one for each of their six corners.
+/// let entries = |count| Tensor::<NdArray, 3>::zeros([1, count, 2], &Default::default());
+/// assert_eq!(Attributes::of_faces(entries(2)).values().dims(), [1, 2, 2]);
+/// assert_eq!(Attributes::of_corners(entries(6)).channels(), 2);
 /// ```
 #[derive(Clone, Debug)]
 pub struct Attributes<B: Backend> {

@@ -22,6 +22,8 @@ fn slice<F: Element>(data: &TensorData) -> &[F] {
 /// By default they run on the host, for all CPU backends. The implementation for `Autodiff<B>` makes them twice differentiable: the
 /// derivative of each pass is the next pass of `B`. A third order panics. The backward pass reuses the inputs and intermediates such as the
 /// faces per row.
+///
+/// [`Cameras`](crate::Cameras) has an example of code that is generic over backends.
 #[diagnostic::on_unimplemented(
     message = "softrast does not draw on the backend `{Self}`",
     note = "it draws on `NdArray`, `Flex` and `softrast_raster::Wgpu`, and on `Autodiff` of these, of the features ndarray, flex and wgpu",
@@ -58,8 +60,7 @@ pub trait RasterBackend: Backend {
 }
 
 /// An op and its inputs.
-#[doc(hidden)]
-pub type Call<B> = (FusedOp, Vec<FloatTensor<B>>);
+type Call<B> = (FusedOp, Vec<FloatTensor<B>>);
 
 /// The numbers of a tensor, or of its copy.
 fn numbers<'a, B: RasterBackend, F: Element>(

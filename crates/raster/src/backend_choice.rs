@@ -16,6 +16,20 @@ pub type HostBackend = softrast_tensor::Flex;
 ///
 /// [`compiled_backends!`](crate::compiled_backends) lists those of a program, and
 /// [`on_backend!`](crate::on_backend) goes from the choice to a type.
+///
+/// ```
+/// use softrast_raster::{BackendChoice, NoAdapter, NoBackend};
+///
+/// let compiled = &[BackendChoice::NdArray];
+/// let choice = BackendChoice::among(compiled, None)?;
+/// assert_eq!((choice.name(), choice.title()), ("ndarray", "ndarray f32"));
+/// let missing = BackendChoice::among(compiled, Some("flex"));
+/// assert!(matches!(missing, Err(NoBackend::Missing { asked: BackendChoice::Flex, .. })));
+/// // Fails where wgpu finds no adapter.
+/// let up: Result<(), NoAdapter> = choice.set_up();
+/// assert_eq!(up, Ok(()));
+/// # Ok::<(), NoBackend>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BackendChoice {
     /// `burn-ndarray`, on the CPU.

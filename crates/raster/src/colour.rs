@@ -1,6 +1,16 @@
 use softrast_tensor::{Backend, Bool, Tensor, TensorData, numbers};
 
 /// The background, blended with the faces at every pixel.
+///
+/// ```
+/// use softrast_raster::{Background, HostBackend, blend};
+/// use softrast_tensor::{numbers, tensor, vector};
+///
+/// // A white face and a black background of equal weight, at one pixel.
+/// let background = Background { colour: vector::<HostBackend>(&[0.0]), log_weight: vector(&[0.0]) };
+/// let blended = blend(tensor(vec![0.0], [1; 3]), tensor(vec![1.0], [1; 4]), &background);
+/// assert_eq!(numbers(blended), [0.5]);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Background<B: Backend> {
     /// Its colour `[channels]`.
@@ -10,6 +20,14 @@ pub struct Background<B: Backend> {
 }
 
 /// Normalised depth, of the same shape: 1 at the near plane, 0 at the far plane, linear between and beyond.
+///
+/// ```
+/// use softrast_raster::{HostBackend, nearness};
+/// use softrast_tensor::{numbers, vector};
+///
+/// let depths = vector::<HostBackend>(&[1.0, 2.0, 5.0]);
+/// assert_eq!(numbers(nearness(depths, [1.0, 3.0])), [1.0, 0.5, -1.0]);
+/// ```
 ///
 /// Source: docs/notes.md, Colour.
 ///

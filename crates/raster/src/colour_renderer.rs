@@ -251,6 +251,24 @@ impl<S: Softness> ColourRenderer<S> {
     /// [`image`](Self::image) with parameters φ of the edge and the depth softness, which receive gradients too. On a GPU each image waits
     /// to read them back, which is impossible in a browser.
     ///
+    /// ```
+    /// use softrast_raster::{Attributes, ColourRenderer, HostBackend, Projected, vertices};
+    /// use softrast_softness::{DepthSoftness, Family};
+    /// use softrast_tensor::{Autodiff, vector};
+    ///
+    /// let (faces, device) = ([[0, 1, 2]], Default::default());
+    /// let corners = [[-0.5, -0.5, 2.0], [0.5, -0.5, 2.0], [0.0, 0.5, 2.0]];
+    /// let corners = Projected::new(vertices::<Autodiff<HostBackend>>(&corners, &device));
+    /// let white = Attributes::of_vertices(vertices(&[[1.0; 3]; 3], &device), &faces);
+    /// let renderer = ColourRenderer::new(&faces, 8, Family::Logistic, 0.05, [1.0, 3.0])
+    ///     .with_depth(DepthSoftness::Family(Family::Logistic), 0.2);
+    /// let [edge, depth] = renderer.phi().each_ref().map(|phi| vector(phi).require_grad());
+    /// let background = renderer.background(&[0.0; 3], &device);
+    /// let image = renderer.image_with(corners, &white, [&edge, &depth], &background);
+    /// let gradients = image.mean().backward();
+    /// assert!(edge.grad(&gradients).is_some() && depth.grad(&gradients).is_some());
+    /// ```
+    ///
     /// # Panics
     ///
     /// If shapes do not fit, or float types differ.

@@ -18,6 +18,26 @@
 //! // The pixel in the middle, and the one at the top left.
 //! assert!(alpha[4] > 0.99 && alpha[0] < 0.01);
 //! ```
+//!
+//! # Example: a sharp image with a wide gradient
+//!
+//! ```
+//! use softrast_raster::{HostBackend, Projected, SoftRenderer, vertices};
+//! use softrast_softness::Family;
+//! use softrast_tensor::{Autodiff, numbers};
+//!
+//! let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
+//! let corners = vertices::<Autodiff<HostBackend>>(&corners, &Default::default()).require_grad();
+//! let sharp = SoftRenderer::new(&[[0, 1, 2]], 8, Family::Logistic, 1e-4).without_back_faces();
+//! let surrogate = sharp.clone().with_surrogate(Family::Logistic, 0.1);
+//! let [(image, gradient), (same, wide)] = [sharp, surrogate].map(|renderer| {
+//!     let image = renderer.silhouette(Projected::new(corners.clone()));
+//!     let gradient = corners.grad(&image.clone().sum().backward()).unwrap();
+//!     (numbers(image.inner()), numbers(gradient.abs().sum())[0])
+//! });
+//! assert_eq!(image, same);
+//! assert!(gradient < 1e-3 && wide > 1.0);
+//! ```
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-raster needs a backend: turn on one of the features ndarray, flex, wgpu");
@@ -83,9 +103,32 @@ pub use weighting::Weighting;
 pub use width::{Width, WidthSchedule};
 
 /// Components of the renderers, to prepare tables, run ops on slices, or measure them. They take projected vertices as plain tensors.
+///
+/// ```
+/// use softrast_raster::low_level::{FusedOp, Numbers, Pass, Profile, Rasterizer, Silhouette, profile_sum};
+/// use softrast_raster::{HostBackend, vertices};
+/// use softrast_softness::{EdgeSoftness, Family, Softness};
+/// use softrast_tensor::vector;
+///
+/// let softness = EdgeSoftness::new(Family::Logistic);
+/// let phi = vector::<HostBackend>(&softness.default_phi(0.02));
+/// let silhouette: Silhouette<_> = Rasterizer::new(8).prepare(&[[0, 1, 2]].into(), softness, &phi);
+/// let profile: &Profile = silhouette.profile();
+/// assert!(profile.error() <= Rasterizer::TOLERANCE && profile.support()[0] < 1.0);
+///
+/// // The sums of tensors, and of slices: vertices axis by axis.
+/// let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
+/// let (op, table) = (silhouette.op(), silhouette.table(phi));
+/// let FusedOp::ProfileSum(sum) = &op else { unreachable!() };
+/// let sums = profile_sum(sum, vertices::<HostBackend>(&corners, &Default::default()), table.clone());
+/// let table: Vec<f32> = table.into_data().iter().collect();
+/// let axes: Vec<f32> = (0..9).map(|k| corners[k % 3][k / 3] as f32).collect();
+/// let dims = [vec![1, 3, 3], vec![table.len() / 4, 4]];
+/// assert_eq!(f32::run_pass(&op, &Pass::Forward, &[&axes, &table], &dims), sums.into_data());
+/// ```
 pub mod low_level {
     pub use crate::{
-        backend::{Call, profile_sum},
+        backend::profile_sum,
         colour_renderer::WeightTables,
         ops::blend::SoftBlend,
         ops::loss::SilhouetteLoss,
@@ -101,4 +144,4 @@ pub(crate) use low_level::*;
 /// Compiles and runs the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-pub struct Readme;
+struct Readme;

@@ -67,6 +67,17 @@ pub fn ssim_loss<B: Backend>(image: Tensor<B, 4>, target: Tensor<B, 4>) -> Tenso
 /// The mean over `levels` of `loss`, for pictures `[views, channels, height, width]` in full size, half size, a quarter and so on. Wide
 /// differences count at every level, so a picture is attracted to a target that it does not overlap.
 ///
+/// ```
+/// use softrast_raster::{HostBackend, huber_loss, l1_loss, multi_scale_loss, ssim_loss};
+/// use softrast_tensor::{Tensor, numbers};
+///
+/// let full = |x: f64| Tensor::<HostBackend, 4>::full([1, 3, 16, 16], x, &Default::default());
+/// assert_eq!(numbers(l1_loss(full(0.0), full(1.0))), [1.0]);
+/// assert_eq!(numbers(huber_loss(full(0.0), full(1.0), 0.5)), [0.375]);
+/// assert!(numbers(ssim_loss(full(1.0), full(1.0)))[0].abs() < 1e-5);
+/// assert_eq!(numbers(multi_scale_loss(full(0.0), full(1.0), 2, l1_loss)), [1.0]);
+/// ```
+///
 /// # Panics
 ///
 /// If `levels` is 0, or the sides cannot be halved often enough.

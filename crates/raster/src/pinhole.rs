@@ -59,6 +59,15 @@ pub struct PyTorch3dCamera {
 }
 
 /// Errors of a [`Pinhole`].
+///
+/// ```
+/// use softrast_raster::{Pinhole, PinholeError};
+///
+/// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 64);
+/// assert_eq!(camera.check(), Ok(()));
+/// let wrong = Pinhole { focal: [-1.0, 1.0], ..camera };
+/// assert_eq!(wrong.check(), Err(PinholeError::NoFocalLength(-1.0, 1.0)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PinholeError {
     /// A number is infinite or NaN.
@@ -117,6 +126,15 @@ impl Pinhole {
 
     /// The equivalent orbit, if there is one: the camera looks at the origin without a roll, its pixels are square and its principal point
     /// is in the middle, all to 1e-6.
+    ///
+    /// ```
+    /// use softrast_raster::{Orbit, Pinhole};
+    ///
+    /// let orbit = Orbit { distance: 3.0, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 40.0 };
+    /// let camera = Pinhole::from_orbit(&orbit, 64);
+    /// assert!((camera.orbit().unwrap().azimuth_deg - 30.0).abs() < 1e-9);
+    /// assert!(camera.cropped([0.0; 2], [32.0; 2], 64).orbit().is_none());
+    /// ```
     pub fn orbit(&self) -> Option<Orbit> {
         let ([right, down, ahead], t) = (self.rotation, self.translation);
         let ([fx, fy], [cx, cy], size) = (self.focal, self.centre, self.size);

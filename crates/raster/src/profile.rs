@@ -21,6 +21,8 @@ const BEYOND_END: u32 = 24;
 ///
 /// The spacing of its cells suits all families equally, so no family needs custom knots, and an MLP costs no more per pixel than a
 /// logistic. Gradients of any order reach the parameters through the values and slopes at the knots.
+///
+/// The module [`low_level`](crate::low_level) has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     curve: CubicCurve,

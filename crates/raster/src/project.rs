@@ -11,6 +11,22 @@ use crate::{
 /// Implemented for orbits `[views, 4]` (distance in world units, then elevation, azimuth and the whole field of view in degrees, as in
 /// [`Orbit::tensor`](crate::Orbit::tensor)), for [`Pinholes`](crate::Pinholes), and for custom matrices `[views, 3, 4]`. Gradients reach
 /// all of these tensors.
+///
+/// ```
+/// use softrast_raster::{Cameras, HostBackend, RasterBackend, project, vertices};
+/// use softrast_tensor::{Tensor, numbers, tensor};
+///
+/// /// A camera at the origin that looks along z, with this focal length in NDC.
+/// struct Ahead(f64);
+///
+/// impl<B: RasterBackend> Cameras<B> for Ahead {
+///     fn matrices(&self) -> Tensor<B, 3> {
+///         tensor(vec![self.0, 0.0, 0.0, 0.0, 0.0, self.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0], [1, 3, 4])
+///     }
+/// }
+/// let point = vertices::<HostBackend>(&[[0.5, 0.0, 2.0]], &Default::default());
+/// assert_eq!(numbers(project(point, Ahead(3.0)).tensor()), [0.75, 0.0, 2.0]);
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` are no cameras on the backend `{B}`",
     note = "`project` takes orbits `[views, 4]`, `Pinholes`, or matrices `[views, 3, 4]`, as tensors of the backend of the vertices"

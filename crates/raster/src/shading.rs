@@ -133,6 +133,18 @@ const HARMONICS: [f64; 9] = [
 ///
 /// `normals` are `[views, n, 3]`, normalised to length 1; `coefficients` are `[9, channels]`.
 ///
+/// ```
+/// use softrast_raster::{HostBackend, spherical_harmonics};
+/// use softrast_tensor::{numbers, tensor};
+///
+/// // Light from above, on faces that look up and down.
+/// let mut coefficients = vec![0.0; 9];
+/// coefficients[1] = 1.0;
+/// let normals = tensor::<HostBackend, 3>(vec![0.0, 1.0, 0.0, 0.0, -1.0, 0.0], [1, 2, 3]);
+/// let light = numbers(spherical_harmonics(normals, tensor(coefficients, [9, 1])));
+/// assert!((light[0] - 0.4886).abs() < 1e-4 && light[1] == -light[0]);
+/// ```
+///
 /// # Panics
 ///
 /// If shapes do not fit.

@@ -14,6 +14,8 @@ use crate::{
 };
 
 /// Settings of silhouettes.
+///
+/// The module [`low_level`](crate::low_level) has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rasterizer {
     /// Height and width of the image in pixels.
@@ -98,6 +100,8 @@ impl Rasterizer {
 }
 
 /// Soft silhouettes of one mesh topology under one softness, through the fused op.
+///
+/// The module [`low_level`](crate::low_level) has an example.
 #[derive(Clone, Debug)]
 pub struct Silhouette<S> {
     softness: S,
@@ -202,8 +206,7 @@ impl<S: Softness> Silhouette<S> {
         profile_sum(&self.op, vertices, table)
     }
 
-    /// The op of [`Silhouette::sums`], for callers that run it on slices.
-    #[doc(hidden)]
+    /// The op of the sums that coverage is computed from, for callers that run it on slices.
     pub fn op(&self) -> FusedOp {
         FusedOp::ProfileSum(self.op.clone())
     }

@@ -19,6 +19,21 @@ const LEAST_SUM: [f64; 2] = [1e-30, 1e-150];
 /// generator, and is not supported.
 ///
 /// Source: Petersen et al. 2022 for the T-conorms; docs/notes.md, T-conorms, for the generators.
+///
+/// ```
+/// use std::f64::consts::LN_2;
+///
+/// use softrast_raster::{TConorm, UnknownTConorm};
+///
+/// // Two faces cover half of a pixel each: an optical depth of ln 2.
+/// for (name, both) in [("probabilistic", 0.75), ("einstein", 0.8), ("yager:1", 1.0)] {
+///     let t_conorm: TConorm = name.parse()?;
+///     assert!((t_conorm.coverage_of(2.0 * t_conorm.generator(LN_2)) - both).abs() < 1e-12);
+/// }
+/// let unknown: UnknownTConorm = "max".parse::<TConorm>().unwrap_err();
+/// assert!(unknown.to_string().starts_with("unknown T-conorm \"max\""));
+/// # Ok::<(), UnknownTConorm>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum TConorm {
     /// `a + b - ab`, the default.

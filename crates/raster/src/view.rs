@@ -14,6 +14,14 @@ use crate::RasterBackend;
 /// Past the pole (|elevation| > 90°) the view rolls by 180°, as in `look_at`. At the pole itself, where `look_at` divides by zero, the axes
 /// are those just before it.
 ///
+/// ```
+/// use softrast_raster::{HostBackend, view_rotation};
+/// use softrast_tensor::{numbers, vector};
+///
+/// let still = view_rotation(vector::<HostBackend>(&[0.0]), vector(&[0.0]));
+/// assert_eq!(numbers(still), [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+/// ```
+///
 /// Source: docs/notes.md, Camera, with the cross products of `look_at` multiplied out.
 pub fn view_rotation<B: RasterBackend>(
     elevation: Tensor<B, 1>,

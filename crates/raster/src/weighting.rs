@@ -13,6 +13,21 @@ pub(crate) const FARTHEST_SEEN: f64 = 1e15;
 /// planes do not clip: a point in front of the first or behind the second has the weight that the softness has there.
 ///
 /// Source: Wu et al. 2024, Eq. 3 and 4.
+///
+/// ```
+/// use softrast_raster::{ColourRenderer, HostBackend, Weighting};
+/// use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+/// use softrast_tensor::{numbers, vector};
+///
+/// let (edge, depth) = (EdgeSoftness::new(Family::Gauss), DepthSoftness::Family(Family::Exp));
+/// let weighting = Weighting { edge, depth, planes: [1.0, 3.0] };
+/// let phi = [edge.default_phi(0.01), depth.default_phi(0.5)];
+/// // Half of the way between the planes divides a weight by e.
+/// let log = numbers(weighting.log_weight_of_depth(vector::<HostBackend>(&phi[1]), vector(&[1.0, 2.0])));
+/// assert!((log[0] - log[1] - 1.0).abs() < 1e-6);
+/// let renderer = ColourRenderer::with_weighting([[0, 1, 2]].into(), 16, weighting, phi);
+/// assert_eq!(renderer.weighting(), &weighting);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighting<S = EdgeSoftness> {
     /// `s`: the softness of the edge.

@@ -30,9 +30,9 @@ impl Width {
     /// A schedule from this width to `end`, in the same unit, geometric in the progress.
     ///
     /// ```
-    /// use softrast_raster::Width;
+    /// use softrast_raster::{Width, WidthSchedule};
     ///
-    /// let narrowing = Width::pixels(4.0).to(1.0);
+    /// let narrowing: WidthSchedule = Width::pixels(4.0).to(1.0);
     /// assert_eq!(narrowing.at(0.5), Width::pixels(2.0));
     /// ```
     #[must_use]

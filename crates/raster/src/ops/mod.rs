@@ -20,6 +20,8 @@ pub use pass::Pass;
 use sum::ProfileSum;
 
 /// An op with custom derivatives.
+///
+/// The module [`low_level`](crate::low_level) has an example.
 #[derive(Clone, Debug)]
 pub enum FusedOp {
     /// See [`crate::low_level::profile_sum`].
@@ -36,6 +38,8 @@ pub enum FusedOp {
 }
 
 /// Float types of ops on slices, without tensors: f32 and f64.
+///
+/// The module [`low_level`](crate::low_level) has an example.
 pub trait Numbers: Element {
     /// Runs a pass over `slices` with the shapes `dims`; see [`Pass`] for the inputs that follow those of the op.
     ///

@@ -1,6 +1,8 @@
 /// A pass of an op: the result, its gradient, or the gradient of that.
 ///
 /// Gradients are concatenated in the order of the inputs, flat, and only those that are wanted.
+///
+/// The module [`low_level`](crate::low_level) has an example.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Pass {
     /// The result.

@@ -6,6 +6,8 @@ use softrast_tensor::{Element, TensorData};
 use crate::{ImageSize, ops::pass::Pass};
 
 /// Constants of the op over its calls: faces, image size and the layout of the table.
+///
+/// The module [`low_level`](crate::low_level) has an example.
 #[derive(Clone, Debug)]
 pub struct ProfileSum {
     pub(crate) faces: Arc<[[u32; 3]]>,

@@ -12,6 +12,16 @@ const ON_EDGE: f64 = 1e-24;
 /// `vertices` is `[views, vertices, 3]` (x and y in NDC, depth), `pixels` `[pixels, 2]` in NDC. Edge functions determine inside and
 /// outside; the distance is that to the nearest point of the boundary. Edges belong to the inside; a face without area has none.
 ///
+/// ```
+/// use softrast_raster::{HostBackend, reference::signed_distance, vertices};
+/// use softrast_tensor::{numbers, tensor};
+///
+/// let corners = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let corners = vertices::<HostBackend>(&corners, &Default::default());
+/// let pixels = tensor(vec![0.25, 0.25, 0.5, -0.5], [2, 2]);
+/// assert_eq!(numbers(signed_distance(corners, &[[0, 1, 2]], pixels)), [0.25, -0.5]);
+/// ```
+///
 /// Source: Petersen et al. 2022, computed by projection onto the edges instead of barycentric
 /// coordinates (docs/notes.md, Signed distance).
 ///

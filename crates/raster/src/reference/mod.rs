@@ -1,6 +1,23 @@
 //! The definition: burn tensor ops over every pixel-face pair, on any backend, to any order.
 //!
 //! Slow (about 1.3 kB of memory traffic per pair) and simple; every faster implementation is tested against it.
+//!
+//! ```
+//! use softrast_raster::{HostBackend, Projected, SoftRenderer, TConorm, vertices};
+//! use softrast_raster::reference::{Scene, sums};
+//! use softrast_softness::Family;
+//! use softrast_tensor::numbers;
+//!
+//! let (faces, device) = ([[0, 1, 2]], Default::default());
+//! let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
+//! let corners = vertices::<HostBackend>(&corners, &device);
+//! let renderer = SoftRenderer::new(&faces, 8, Family::Logistic, 0.02);
+//! let scene = Scene { faces: &faces, size: 8.into() };
+//! let t_conorm = TConorm::Probabilistic;
+//! let sums = sums(scene, corners.clone(), &Family::Logistic, t_conorm, renderer.phi_tensor(&device));
+//! let drawn = numbers(renderer.silhouette(Projected::new(corners)));
+//! assert!(numbers(t_conorm.coverage(sums)).iter().zip(&drawn).all(|(a, b)| (a - b).abs() < 2e-5));
+//! ```
 
 mod blend;
 mod distance;

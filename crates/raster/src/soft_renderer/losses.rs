@@ -39,6 +39,23 @@ impl<S: Softness> SoftRenderer<S> {
     /// [`mse_loss`](Self::mse_loss) with pixel weights `[1 or views, height, width]` in [0, 1], which multiply the coverage. Without
     /// weights, every pixel counts in full.
     ///
+    /// ```
+    /// use softrast_raster::{HostBackend, Projected, SoftRenderer, vertices};
+    /// use softrast_softness::Family;
+    /// use softrast_tensor::{Tensor, numbers};
+    ///
+    /// let device = Default::default();
+    /// let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
+    /// let corners = Projected::new(vertices::<HostBackend>(&corners, &device));
+    /// let renderer = SoftRenderer::new(&[[0, 1, 2]], 8, Family::Logistic, 0.02);
+    /// // Weights of 0 leave an empty image.
+    /// let full = |x: f64| Tensor::full([1, 8, 8], x, &device);
+    /// let loss = renderer.weighted_mse_loss(corners.clone(), full(1.0), Some(full(0.0)));
+    /// assert_eq!(numbers(loss), [1.0]);
+    /// let loss = renderer.weighted_iou_loss(corners, full(1.0), Some(full(0.0)));
+    /// assert_eq!(numbers(loss), [1.0]);
+    /// ```
+    ///
     /// # Panics
     ///
     /// If the target or the weights have another size.
