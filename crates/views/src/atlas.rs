@@ -21,6 +21,21 @@ const MOST_ROUNDS: usize = 8;
 ///
 /// A single picture without a factor is used unchanged. Otherwise the visible parts of the pictures are packed. Colours interpolated
 /// between texels equal those of the original pictures, also across seams and repeats.
+///
+/// ```
+/// use softrast_mesh::{Material, Mesh, Texture};
+/// use softrast_views::Atlas;
+///
+/// let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+/// let mesh = Mesh::new(corners, vec![[0, 1, 2], [2, 1, 3]])?;
+/// let [red, blue] = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]].map(|of| Material::default().with_factor(of));
+/// let texture = Texture::new(vec![[0.0; 2]], vec![[0; 3]; 2])?.with_materials(vec![red?, blue?], vec![0, 1])?;
+/// let (atlas, errors) = Atlas::of(&mesh.with_texture(texture)?, 1 << 10);
+/// let atlas = atlas.unwrap();
+/// let blue = atlas.colour_at(atlas.coordinates()[atlas.corners()[1][0] as usize]);
+/// assert!(errors.is_empty() && blue[0] == 0.0 && blue[2] > 0.5);
+/// # Ok::<(), softrast_mesh::MeshError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Atlas {
     coordinates: Vec<[f64; 2]>,

@@ -98,6 +98,15 @@ impl Frame {
 
 /// The middle of the bounding box of a mesh, and the distance of its farthest vertex from there, in the unit of the mesh. Unused vertices
 /// are ignored.
+///
+/// ```
+/// use softrast_mesh::icosphere;
+/// use softrast_views::bounding_ball;
+///
+/// let (middle, radius) = bounding_ball(&icosphere(1));
+/// assert_eq!(middle, [0.0; 3]);
+/// assert!((radius - 1.0).abs() < 1e-12);
+/// ```
 pub fn bounding_ball(mesh: &Mesh) -> ([f64; 3], f64) {
     let [low, high] = mesh.bounds();
     let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);

@@ -15,6 +15,32 @@
 //! let mask = Picture::new(covered.iter().map(|&part| part as f32).collect(), 64);
 //! assert_eq!(mask_iou(&covered, &mask), 1.0);
 //! ```
+//!
+//! # Example: colours of a picture
+//!
+//! A [`PaintedView`] adds the colours of its picture to a view; [`TexelReads`] compares them with a texture on an [`Unwrapped`] mesh.
+//!
+//! ```
+//! use softrast_mesh::icosphere;
+//! use softrast_raster::Pinhole;
+//! use softrast_views::{PaintedView, Picture, TexelPull, TexelReads, Unwrapped, View, coloured_pixels};
+//!
+//! let (ball, distortion) = (icosphere(2), None);
+//! let camera = Pinhole::look_at([0.0, 0.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 32);
+//! let picture = |levels: Vec<f64>| Picture::new(levels.iter().map(|&x| x as f32).collect(), 32);
+//! let [red, green, blue, mask] = coloured_pixels(&ball, &camera).map(picture);
+//! let view = View { name: "white".into(), picture: "white.png".into(), mask, camera, distortion, off: 0.0 };
+//! let opaque = Picture::new(vec![1.0; 32 * 32], 32);
+//! let view = PaintedView::new(view, [red, green, blue], &opaque);
+//! assert!(view.psnr(&ball).unwrap() > 60.0);
+//!
+//! let unwrapped = Unwrapped::of(&ball, 64)?;
+//! let reads = TexelReads::new(&ball, &unwrapped, &[view], 0.0)?;
+//! let [black, white] = [0.0, 1.0].map(|level| reads.pull(&[level; 3 * 64 * 64], true));
+//! let TexelPull { half, gradient } = black;
+//! assert!(white.half < 1e-6 * half && gradient.iter().all(|&by_texel| by_texel <= 0.0));
+//! # anyhow::Ok(())
+//! ```
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-views needs a backend: turn on one of the features ndarray, flex, wgpu");
@@ -55,4 +81,4 @@ pub use views::Views;
 /// Compiles and runs the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-pub struct Readme;
+struct Readme;

@@ -3,6 +3,21 @@ use anyhow::{anyhow, ensure};
 use crate::picture_file::Pixel;
 
 /// Conversion of the levels of a picture to a mask.
+///
+/// ```
+/// use softrast_views::{MaskRules, Picture, PictureFile};
+///
+/// let grey = image::GrayImage::from_raw(2, 1, vec![0, 255]).unwrap();
+/// let mut png = std::io::Cursor::new(Vec::new());
+/// grey.write_to(&mut png, image::ImageFormat::Png)?;
+/// let file = PictureFile::decode(png.get_ref())?;
+/// let mask = |rules| anyhow::Ok(Picture::mask_of(&file, &rules)?.pixels().to_vec());
+/// let plain = MaskRules::default();
+/// assert_eq!(mask(plain)?, [0.0, 1.0]);
+/// assert_eq!(mask(MaskRules { invert: true, ..plain })?, [1.0, 0.0]);
+/// assert_eq!(mask(MaskRules { label: Some(0), ..plain })?, [1.0, 0.0]);
+/// # anyhow::Ok(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaskRules {
     /// Whether black pixels are the mask.

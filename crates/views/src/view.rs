@@ -13,6 +13,18 @@ use crate::{
 
 /// A camera as JSON: R and t of OpenCV, the camera-to-world matrix of nerfstudio (`transform_matrix`), the pose of COLMAP (`colmap`: QW,
 /// QX, QY, QZ, TX, TY, TZ), K, width and height, and the equivalent orbit if there is one.
+///
+/// ```
+/// use softrast_raster::Pinhole;
+/// use softrast_views::{PoseFile, camera_json};
+///
+/// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 64);
+/// let json = camera_json(&camera);
+/// assert_eq!(json["width"], 64);
+/// let pose = PoseFile::parse(json.to_string().as_bytes(), "camera.json")?;
+/// assert_eq!(pose.translation, camera.translation);
+/// # anyhow::Ok(())
+/// ```
 pub fn camera_json(camera: &Pinhole) -> Value {
     let ([fx, fy], [cx, cy]) = (camera.focal, camera.centre);
     let mut found = json!({
@@ -132,6 +144,18 @@ fn first_and_more<'a>(mut names: impl ExactSizeIterator<Item = &'a String>) -> S
 
 /// Number of faces of a mesh that cross the plane at a depth in front of a camera, in world units: they have corners on both sides. Those
 /// across [`NEAR`](softrast_raster::NEAR) are not drawn.
+///
+/// ```
+/// use softrast_mesh::icosphere;
+/// use softrast_raster::{NEAR, Pinhole};
+/// use softrast_views::faces_across;
+///
+/// let [outside, inside] = [4.0, 0.5].map(|z| {
+///     let camera = Pinhole::look_at([0.0, 0.0, z], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 64);
+///     faces_across(&icosphere(2), &camera, NEAR)
+/// });
+/// assert!(outside == 0 && inside > 0);
+/// ```
 pub fn faces_across(mesh: &Mesh, camera: &Pinhole, depth: f64) -> usize {
     let ahead: Vec<bool> =
         mesh.positions().iter().map(|&p| camera.transform(p)[2] >= depth).collect();

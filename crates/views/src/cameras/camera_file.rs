@@ -22,6 +22,18 @@ const MODELS: [&str; 6] = ["", "sparse/0", "sparse", "colmap", "colmap/sparse/0"
 ///   `frames` with `file_path` and `transform_matrix` (camera to world; x right, y up, z behind). `mask_path` is the mask of a frame.
 /// - A COLMAP model: `cameras.bin` and `images.bin`, or `.txt`.
 /// - A single [`Lens`].
+///
+/// ```
+/// use softrast_views::{CameraFile, Picture};
+///
+/// let json = r#"{"camera_angle_x": 0.8, "w": 8, "h": 8, "frames": [{"file_path": "a.png",
+///     "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]]}]}"#;
+/// let file = CameraFile::parse(json.as_bytes(), "transforms.json")?;
+/// let views = file.views(None, |_mask| Ok(Picture::new(vec![1.0; 64], 8)))?;
+/// assert_eq!((&*views[0].name, views[0].camera.eye()), ("a.png", [0.0, 0.0, 3.0]));
+/// assert_eq!(file.lens_of("a.png".as_ref())?.pinhole(8.into())?.focal, views[0].camera.focal);
+/// # anyhow::Ok(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct CameraFile {
     /// The file, for errors.

@@ -12,6 +12,16 @@ const MOST_STRETCHED: f64 = 10.0;
 /// Lens distortion relative to a pinhole, in the models of OpenCV.
 ///
 /// A point `(X, Y, Z)` before the camera has `x = X / Z`, `y = Y / Z` and `r² = x² + y²`. Its pixel is `(fx x' + cx, fy y' + cy)`.
+///
+/// ```
+/// use softrast_views::{Distortion, Lens};
+///
+/// let barrel = Distortion::Rational { k: [-0.1, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
+/// assert!((barrel.bend([0.5, 0.0])[0] - 0.4875).abs() < 1e-12);
+/// let lens = Lens::parse(br#"{"fl_x": 8.0, "k1": -0.1}"#, "lens.json")?;
+/// assert_eq!(lens.camera(8.into())?.1, Some(barrel));
+/// # anyhow::Ok(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distortion {
     /// `x' = x q + 2 p1 x y + p2 (r² + 2 x²)` and `y' = y q + p1 (r² + 2 y²) + 2 p2 x y` with

@@ -10,6 +10,15 @@ use super::{
 };
 
 /// The pose of a camera in a file.
+///
+/// ```
+/// use softrast_views::PoseFile;
+///
+/// let json = br#"{"R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [0, 0, 4]}"#;
+/// let pose = PoseFile::parse(json, "pose.json")?;
+/// assert_eq!((pose.translation, pose.note), ([0.0, 0.0, 4.0], None));
+/// # anyhow::Ok(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseFile {
     /// R, row by row, from world to camera axes, in the convention of OpenCV.

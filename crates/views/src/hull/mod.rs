@@ -33,6 +33,23 @@ pub fn visual_hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
 }
 
 /// The space that masks exclude, to make [`visual_hull`]s of it with several numbers of cells.
+///
+/// ```
+/// use softrast_mesh::icosphere;
+/// use softrast_raster::Pinhole;
+/// use softrast_views::{Picture, View, VisualHull, coloured_pixels};
+///
+/// let views = [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]].map(|eye| {
+///     let camera = Pinhole::look_at(eye, [0.0; 3], [1.0; 3], 40.0, 32);
+///     let [.., covered] = coloured_pixels(&icosphere(2), &camera);
+///     let mask = Picture::new(covered.iter().map(|&part| part as f32).collect(), 32);
+///     View { name: "ball".into(), picture: "".into(), mask, camera, distortion: None, off: 0.0 }
+/// });
+/// let hull = VisualHull::new(&views)?;
+/// let [rough, fine] = [10, 20].map(|cells| hull.mesh(cells));
+/// assert!(rough?.faces().len() < fine?.faces().len());
+/// # anyhow::Ok(())
+/// ```
 pub struct VisualHull<'a> {
     cones: Vec<Cone<'a>>,
     centre: [f64; 3],

@@ -11,6 +11,15 @@ use crate::Distortion;
 ///
 /// A picture file of more than 4,194,304 pixels, such as 2048 × 2048, is reduced to that many or slightly fewer when it is read.
 /// [`Picture::size`] is then the reduced size, [`Picture::whole_size`] that of the file.
+///
+/// ```
+/// use softrast_views::Picture;
+///
+/// let picture = Picture::new(vec![0.0, 0.25, 0.75, 1.0], 2);
+/// assert_eq!(picture.size(), [2, 2].into());
+/// assert_eq!(picture.clone().inverted().pixels(), [1.0, 0.75, 0.25, 0.0]);
+/// assert_eq!(picture.thresholded(0.5).pixels(), [0.0, 0.0, 1.0, 1.0]);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// From 0 to 1, row by row from the top.

@@ -27,6 +27,19 @@ const LONGEST_SIDE: u32 = 65_535;
 ///
 /// A picture has at most 65,535 pixels along a side, and 512 MiB of decoded pixels (341 MiB for a JPEG file), which is checked in its
 /// header before anything is decoded. Its file has at most 256 MiB.
+///
+/// ```
+/// use softrast_views::PictureFile;
+///
+/// let grey = image::GrayImage::from_raw(2, 1, vec![0, 255]).unwrap();
+/// let mut png = std::io::Cursor::new(Vec::new());
+/// grey.write_to(&mut png, image::ImageFormat::Png)?;
+/// let file = PictureFile::decode(png.get_ref())?;
+/// assert_eq!(file.size(), [1, 2].into());
+/// assert_eq!(file.texels(2).into_raw(), [0, 0, 0, 255, 255, 255]);
+/// assert_eq!(file.texels(1).dimensions(), (1, 1));
+/// # anyhow::Ok(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct PictureFile {
     image: DynamicImage,

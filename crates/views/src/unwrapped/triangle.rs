@@ -2,6 +2,14 @@
 
 /// Shows the column and the row of each texel whose middle lies in a triangle, and the shares of the corners there. Corners are in texels; the middle of
 /// the first one is (0.5, 0.5). Of triangles side by side one shows a texel on their border, up to rounding.
+///
+/// ```
+/// use softrast_views::covered_texels;
+///
+/// let mut texels = Vec::new();
+/// covered_texels([[0.0, 0.0], [2.2, 0.0], [0.0, 2.2]], |texel, _shares| texels.push(texel));
+/// assert_eq!(texels, [[0, 0], [1, 0], [0, 1]]);
+/// ```
 pub fn covered_texels(corners: [[f64; 2]; 3], mut show: impl FnMut([i64; 2], [f64; 3])) {
     let [a, b, c] = corners;
     let side = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
