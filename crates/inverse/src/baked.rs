@@ -14,6 +14,18 @@ const APART: usize = 3;
 /// of `fine`. Colours are rounded to 8 bits. Texels beyond the longest side of a face are extrapolated from it, clamped to [0, 1]: half way
 /// along that side the interpolated colour may be off by a quarter of the clamped amount.
 ///
+/// ```
+/// use softrast_inverse::baked;
+/// use softrast_mesh::icosphere;
+///
+/// let (ball, fine) = (icosphere(0), icosphere(0).subdivided());
+/// let red = vec![[1.0, 0.0, 0.0]; fine.positions().len()];
+/// let textured = baked(&ball, &fine.with_colours(red)?)?;
+/// assert_eq!(textured.faces(), ball.faces());
+/// assert!(textured.texture().unwrap().picture().is_some());
+/// # anyhow::Ok(())
+/// ```
+///
 /// # Errors
 ///
 /// If `fine` has no colours, or is not the mesh after some subdivisions.

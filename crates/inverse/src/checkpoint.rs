@@ -5,6 +5,21 @@ use softrast_meta::{OuterLoop, Progress};
 const FORMAT: &str = "softrast learning checkpoint 2";
 
 /// State of learning in a file, and its job.
+///
+/// ```
+/// use softrast_inverse::Checkpoint;
+/// use softrast_meta::{Adam, MetaGradient, OuterLoop, Progress, Validation};
+///
+/// let validation = Validation { seed: 0, count: 1, every: 1, patience: None };
+/// let (estimator, optimizer) = (MetaGradient::default(), Adam::new(0.1));
+/// let learner = OuterLoop { estimator, optimizer, clip: 1.0, steps: 9, batch: 1, seed: 1, validation };
+/// let progress = Progress::new(vec![0.5]);
+/// let text = Checkpoint { job: "pose".into(), progress: progress.clone() }.text()?;
+/// assert_eq!(Checkpoint::parse(text.as_bytes(), "pose", &learner, 1)?, progress);
+/// let other = Checkpoint::parse(text.as_bytes(), "shape", &learner, 1).unwrap_err();
+/// assert!(other.to_string().contains("another job"));
+/// # anyhow::Ok(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {

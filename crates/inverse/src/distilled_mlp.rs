@@ -33,6 +33,14 @@ pub fn distilled_mlp() -> Vec<f64> {
 /// Fitted by least squares on the logit up to `REACH`, always from the same random weights. The
 /// error at a distance is divided by one scale plus the distance: at the edge the logit decides the
 /// image, and far from it the logit only has to be large.
+///
+/// ```
+/// use softrast_inverse::mlp_like;
+/// use softrast_softness::{EdgeSoftness, Family, Softness};
+///
+/// let one_sided = EdgeSoftness::new(Family::Gamma);
+/// assert_eq!(mlp_like(one_sided, &one_sided.default_phi(1.0)), None);
+/// ```
 pub fn mlp_like(softness: EdgeSoftness, phi: &[f64]) -> Option<Vec<f64>> {
     type A = Autodiff<HostBackend>;
     let place = |k: usize| {

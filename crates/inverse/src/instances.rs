@@ -17,6 +17,23 @@ const SHARP_PX: f64 = 0.25;
 /// of pixels cost half of their cost in the hard image.
 const NEARLY_HARD_PX: f64 = 0.05;
 /// The distribution of instances that a softness is learned on: by seed, each solved with the settings `solve`.
+///
+/// ```
+/// use softrast_inverse::{Instances, InverseProblem, LearnConfig, Method, PoseProblem, ScheduledSoftness, SolveConfig};
+/// use softrast_mesh::icosphere;
+/// use softrast_meta::TaskDistribution;
+/// use softrast_raster::HostBackend;
+/// use softrast_tensor::vector;
+///
+/// let problem = PoseProblem::new(&icosphere(0));
+/// let solve = SolveConfig { size: 8, steps: 2, ..problem.defaults() };
+/// let method = Method::new("learned", ScheduledSoftness::learned("pose")?);
+/// let instances = Instances::<_, HostBackend>::new(problem, &method, &solve, &LearnConfig::default())?;
+/// let phi = vector(&instances.start());
+/// let [first, second, again] = [0, 1, 0].map(|seed| instances.loss(seed, &phi));
+/// assert!(first == again && first != second);
+/// # anyhow::Ok(())
+/// ```
 pub struct Instances<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
     pub(crate) problem: Rc<P>,
     solve: SolveConfig,

@@ -10,6 +10,8 @@ use crate::{
 };
 
 /// State of all instances after some steps.
+///
+/// The [crate](crate) has an example.
 #[derive(Clone, Debug)]
 pub struct Iterate {
     /// Steps taken so far.

@@ -14,6 +14,32 @@ const CLIP: f64 = 1.0;
 const VALIDATIONS: usize = 10;
 
 /// A softness that is being learned on a problem, one update at a time.
+///
+/// ```
+/// use softrast_inverse::{InverseProblem, LearnConfig, Learning, Method, OuterLoss, PoseProblem, ScheduledSoftness, SolveConfig};
+/// use softrast_mesh::icosphere;
+/// use softrast_raster::HostBackend;
+/// use softrast_softness::{EdgeSoftness, Family};
+///
+/// let problem = PoseProblem::new(&icosphere(0));
+/// let start = ScheduledSoftness::constant(EdgeSoftness::new(Family::Gauss), 0.1);
+/// let method = Method::new("gauss", start.clone());
+/// let solve = SolveConfig { size: 8, steps: 2, ..problem.defaults() };
+/// let outer_loss = Some(OuterLoss::Hard);
+/// let config = LearnConfig { updates: 2, batch: 1, validation_runs: 1, outer_loss, ..LearnConfig::default() };
+/// let learning = || Learning::<_, HostBackend>::new(problem.clone(), &method, &solve, &config);
+///
+/// let mut first = learning()?;
+/// first.step()?;
+/// let checkpoint = first.checkpoint("gauss")?;
+/// let mut resumed = learning()?;
+/// resumed.resume(checkpoint.as_bytes(), "gauss")?;
+/// while resumed.step()?.is_some() {}
+/// assert_eq!((first.progress().step, resumed.progress().step), (1, 2));
+/// let (learned, _) = resumed.learned();
+/// assert_eq!((learned.softness, learned.learning_rate), (start.softness, Some(solve.learning_rate)));
+/// # anyhow::Ok(())
+/// ```
 pub struct Learning<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
     instances: Instances<P, B, S>,
     outer_loop: OuterLoop,

@@ -44,6 +44,8 @@ pub struct LearnConfig {
 }
 
 /// The loss of the result of an inner loop.
+///
+/// [`Learning`](crate::Learning) has an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OuterLoss {
@@ -61,6 +63,18 @@ pub enum OuterLoss {
 }
 
 /// The variable of a softness with a fixed scale.
+///
+/// ```
+/// use softrast_inverse::{Input, LearnConfig, PhiLayout, ScheduledSoftness};
+/// use softrast_softness::{EdgeSoftness, Family};
+///
+/// let network = ScheduledSoftness::constant(EdgeSoftness::new(Family::Mlp), 0.1);
+/// let parameters = [Input::Ndc, Input::Relative].map(|input| {
+///     let config = LearnConfig { input, ..LearnConfig::default() };
+///     PhiLayout::learned(&network, Vec::new(), 100, 64, &config).start().len()
+/// });
+/// assert_eq!(parameters, [56, 57]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Input {

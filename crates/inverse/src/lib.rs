@@ -11,18 +11,56 @@
 //!
 //! ```
 //! use softrast_tensor::NdArray;
-//! use softrast_inverse::{InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize};
+//! use softrast_inverse::{InverseProblem, Iterate, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize};
 //! use softrast_mesh::icosphere;
 //!
 //! let problem = PoseProblem::new(&icosphere(0));
 //! let method = Method::new("learned", ScheduledSoftness::learned("pose")?);
 //! let config = SolveConfig { size: 8, steps: 2, ..problem.defaults() };
 //! let mut steps = Vec::new();
-//! minimize::<_, NdArray>(&problem, &[problem.instance(0)?], &method, &config, |iterate, _| {
+//! minimize::<_, NdArray>(&problem, &[problem.instance(0)?], &method, &config, |iterate: &Iterate, _| {
 //!     steps.push(iterate.step);
 //!     Ok(())
 //! })?;
 //! assert_eq!(steps, [0, 1, 2]);
+//! # Ok::<(), anyhow::Error>(())
+//! ```
+//!
+//! # Example: colours
+//!
+//! [`paint`] finds the colours of the vertices of a mesh, [`paint_texture`] its texture; [`PaintTargets`] are views as targets of a loss
+//! of one's own.
+//!
+//! ```
+//! use softrast_inverse::{FoundTexture, PaintTargets, SolveConfig, paint, paint_texture};
+//! use softrast_mesh::icosphere;
+//! # use softrast_raster::Pinhole;
+//! use softrast_raster::HostBackend;
+//! use softrast_tensor::{numbers, tensor};
+//! # use softrast_views::{PaintedView, Picture, View, coloured_pixels};
+//! # let ball = icosphere(2);
+//! # let views = [[0.0, 0.0, 4.0], [0.0, 0.0, -4.0]].map(|eye| {
+//! #     let camera = Pinhole::look_at(eye, [0.0; 3], [0.0, 1.0, 0.0], 40.0, 32);
+//! #     let [.., covered] = coloured_pixels(&ball, &camera);
+//! #     let mask = Picture::new(covered.iter().map(|&x| x as f32).collect(), 32);
+//! #     let [red, none] = [1.0, 0.0].map(|level| Picture::new(vec![level; 32 * 32], 32));
+//! #     let view = View { name: "red".into(), picture: "".into(), mask, camera, distortion: None, off: 0.0 };
+//! #     PaintedView::new(view, [red.clone(), none.clone(), none], &red)
+//! # });
+//!
+//! // Two views of a red ball, from in front and from behind.
+//! let config = SolveConfig { size: 16, steps: 5, learning_rate: 0.1 };
+//! let painted = paint(&ball, &views, &config, |_, _| Ok(()))?;
+//! assert!(painted.colours().unwrap().iter().all(|[red, green, _]| *red > 0.9 && *green < 0.1));
+//! let FoundTexture { mesh, stopped, .. } = paint_texture(&ball, &painted, &views, Some(64), |_, _| Ok(()))?;
+//! assert!(mesh.texture().is_some() && stopped.is_none());
+//!
+//! let whole = views.iter().map(|view| (view, [0.0, 0.0, 32.0]));
+//! let targets = PaintTargets::<HostBackend>::new(whole, 8);
+//! // Red, green, blue and the share of the faces.
+//! let image = |pixel: [f64; 4]| tensor::<HostBackend, 4>(pixel.to_vec(), [1, 4, 1, 1]).expand([2, 4, 8, 8]);
+//! let [red, green] = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]].map(|pixel| numbers(targets.loss(image(pixel)))[0]);
+//! assert!(red < 1e-9 && green > 0.1);
 //! # Ok::<(), anyhow::Error>(())
 //! ```
 
@@ -88,4 +126,4 @@ pub use vertex_model::VertexModel;
 /// Compiles and runs the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-pub struct Readme;
+struct Readme;

@@ -44,6 +44,23 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
 /// [`minimize`] one step at a time, for programs that pause and resume: an iterator over all iterates from start to end.
 ///
 /// It owns or borrows the problem. After an error it yields nothing.
+///
+/// ```
+/// use softrast_inverse::{InverseProblem, Method, Minimization, PoseProblem, ScheduledSoftness, SolveConfig};
+/// use softrast_mesh::icosphere;
+/// use softrast_raster::HostBackend;
+///
+/// let problem = PoseProblem::new(&icosphere(0));
+/// let instances = vec![problem.instance(0)?];
+/// let method = Method::new("learned", ScheduledSoftness::learned("pose")?);
+/// let config = SolveConfig { size: 8, steps: 3, ..problem.defaults() };
+/// let run = Minimization::<PoseProblem, HostBackend>::new(problem, instances, &method, &config)?;
+/// let mut run = run.with_pictures();
+/// let start = run.next().unwrap()?;
+/// assert_eq!((start.step, start.image.map(|image| image.len())), (0, Some(64)));
+/// assert_eq!(run.count(), 3);
+/// # anyhow::Ok(())
+/// ```
 pub struct Minimization<
     P: InverseProblem,
     B: RasterBackend,

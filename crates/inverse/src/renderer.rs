@@ -12,6 +12,25 @@ use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 ///
 /// Support and knots follow the softness as in a [`SoftRenderer`]. They are cached for every step, with the tables of
 /// steps without a gradient with respect to φ, because many runs under one softness use them again.
+///
+/// ```
+/// use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer, ScheduledSoftness, SoftnessAt};
+/// use softrast_raster::{HostBackend, Projected, low_level::Rasterizer, vertices};
+/// use softrast_softness::{EdgeSoftness, Family};
+/// use softrast_tensor::numbers;
+///
+/// let narrowing = ScheduledSoftness::decay(EdgeSoftness::new(Family::Logistic), 0.5, 0.01);
+/// let layout = PhiLayout::new(narrowing, Vec::new(), 10, 8);
+/// let (phi, faces) = (layout.start(), Some([[0, 1, 2]].into()));
+/// let renderer = ScheduledRenderer::new(layout, &phi, Rasterizer::new(8), Resolution::Full, faces);
+/// let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
+/// let corners = Projected::new(vertices::<HostBackend>(&corners, &Default::default()));
+/// let [first, last] = [0, 9].map(|step| {
+///     let softness: SoftnessAt<'_, HostBackend> = renderer.at(step);
+///     numbers(softness.silhouette(corners.clone()))
+/// });
+/// assert!(first[0] > 0.05 && last[0] < 1e-3);
+/// ```
 #[derive(Debug)]
 pub struct ScheduledRenderer<S = EdgeSoftness> {
     layout: PhiLayout<S>,
@@ -144,6 +163,8 @@ impl<S: Softness> ScheduledRenderer<S> {
 }
 
 /// The softness at one progress of a run, as passed to [`InverseProblem::image`](crate::InverseProblem::image).
+///
+/// [`ScheduledRenderer`] has an example.
 #[derive(Clone, Debug)]
 pub struct SoftnessAt<'a, B: RasterBackend, S = EdgeSoftness> {
     renderer: &'a ScheduledRenderer<S>,

@@ -3,6 +3,16 @@ use std::{fmt, str::FromStr};
 use serde::{Deserialize, Serialize};
 
 /// Resolution of the image that is optimised. Errors and pictures always use the full resolution.
+///
+/// ```
+/// use softrast_inverse::Resolution;
+///
+/// let auto: Resolution = "auto".parse()?;
+/// assert_eq!([0.1, 0.03].map(|width| auto.side(64, width)), [16, 64]);
+/// assert_eq!(Resolution::sides(24).collect::<Vec<_>>(), [24, 12, 6, 3]);
+/// assert!(Resolution::Side(16).check(64).is_ok() && Resolution::Side(20).check(64).is_err());
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Resolution {

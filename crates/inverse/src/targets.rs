@@ -8,6 +8,18 @@ use softrast_views::Picture;
 
 /// A target image at every size that a run may draw at: its own and, by averaging over areas, each
 /// half of the one before while that is a whole number.
+///
+/// ```
+/// use softrast_inverse::Targets;
+/// use softrast_raster::HostBackend;
+/// use softrast_tensor::{numbers, tensor};
+///
+/// let targets = Targets::<HostBackend>::new(tensor(vec![0.0, 1.0, 0.0, 1.0], [1, 2, 2]));
+/// assert_eq!(targets.levels().len(), 2);
+/// // The mean of the target is one half.
+/// let coarse = tensor(vec![1.0], [1, 1, 1]);
+/// assert_eq!(numbers(targets.mse_loss(coarse)), [0.25]);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Targets<B: Backend> {
     /// `[views, size, size]`, the largest first.

@@ -3,6 +3,8 @@ use softrast_mesh::Mesh;
 use softrast_raster::Orbit;
 
 /// Target and start of one run.
+///
+/// See [`PoseScene`](super::PoseScene) for an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseInstance {
     /// The camera of the target picture, in the frame of the mesh.

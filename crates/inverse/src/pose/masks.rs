@@ -19,6 +19,8 @@ const CLEARANCE: f64 = 1.05;
 const FARTHEST: f64 = 3.0;
 
 /// A mask, its compared square, and a start camera.
+///
+/// See [`MaskPoses`] for an example.
 #[derive(Clone, Debug)]
 pub struct MaskPose {
     /// The picture.
@@ -42,6 +44,32 @@ pub struct MaskPose {
 ///
 /// Cameras nearer to the middle of the mesh than 1.05 times its farthest vertex are not supported: depths stay beyond that, so that no
 /// vertex is behind the camera.
+///
+/// ```
+/// use softrast_inverse::pose::{MaskPose, MaskPoses, MaskScene};
+/// use softrast_inverse::{Method, ScheduledSoftness, SolveConfig, minimize};
+/// use softrast_mesh::fox;
+/// use softrast_raster::{HostBackend, Pinhole};
+/// use softrast_softness::{EdgeSoftness, Family};
+/// use softrast_views::{Picture, coloured_pixels};
+///
+/// let [seen_from, start] = [[0.0, 0.5, 4.0], [0.5, 0.5, 4.0]]
+///     .map(|eye| Pinhole::look_at(eye, [0.0; 3], [0.0, 1.0, 0.0], 40.0, 32));
+/// let [.., covered] = coloured_pixels(&fox(), &seen_from);
+/// let mask = Picture::new(covered.iter().map(|&part| part as f32).collect(), 32);
+/// let pose = MaskPose { square: mask.view_square()?, mask, start, painted: None };
+/// let problem = MaskPoses::new(&fox(), vec![pose.clone()]);
+/// let method = Method::new("gauss", ScheduledSoftness::constant(EdgeSoftness::new(Family::Gauss), 0.05));
+/// let (config, mut off) = (SolveConfig { size: 16, steps: 15, learning_rate: 0.03 }, Vec::new());
+/// let poses = [pose];
+/// minimize::<_, HostBackend>(&problem, &poses, &method, &config, |iterate, scene: &MaskScene<HostBackend>| {
+///     let [camera] = scene.found(iterate.theta.clone(), &poses)[..] else { unreachable!() };
+///     off.push(camera.eye()[0].abs());
+///     Ok(())
+/// })?;
+/// assert!(off[15] < 0.5 * off[0], "{off:?}");
+/// # anyhow::Ok(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct MaskPoses {
     /// The mesh in its frame.

@@ -18,6 +18,22 @@ const HALF_FOV_DEG: [f64; 2] = [1.0, 80.0];
 ///
 /// The optimised θ is `[views, 3]`: distance in world units, elevation and azimuth in degrees; with
 /// an optimised field of view `[views, 4]`, the last being half of it in degrees.
+///
+/// ```
+/// use softrast_inverse::{InverseProblem, PoseProblem, pose::{PoseInstance, PoseScene}};
+/// use softrast_mesh::fox;
+/// use softrast_raster::HostBackend;
+/// use softrast_tensor::{numbers, tensor};
+///
+/// let problem = PoseProblem::new(&fox());
+/// let instance: PoseInstance = problem.instance(0)?;
+/// let scene = PoseScene::<HostBackend>::new(&problem, &[instance], 16);
+/// let loss = |theta| numbers(scene.image_loss(scene.hard(scene.project(theta))))[0];
+/// // Elevation and azimuth are 0 at the answer.
+/// let answer = tensor(vec![instance.target.distance, 0.0, 0.0], [1, 3]);
+/// assert!(loss(answer) < 0.1 && loss(scene.start()) > 0.1);
+/// # anyhow::Ok(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct PoseScene<B: RasterBackend> {
     /// The mesh along the axes of each target camera, rotated but not translated: `[views, vertices, 3]`.

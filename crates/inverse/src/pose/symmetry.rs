@@ -25,12 +25,12 @@ pub struct Symmetry {
 /// distinguishes such poses. The candidate axes are the mesh's coordinate axes and its principal axes of inertia.
 ///
 /// ```
-/// use softrast_inverse::pose::symmetries;
+/// use softrast_inverse::pose::{Symmetry, symmetries};
 /// use softrast_mesh::{fox, icosphere};
 ///
 /// assert!(symmetries(&fox()).is_empty());
 /// let ball = symmetries(&icosphere(3));
-/// assert!(ball.iter().all(|symmetry| symmetry.degrees.is_none()) && ball.len() >= 3);
+/// assert!(ball.iter().all(|symmetry: &Symmetry| symmetry.degrees.is_none()) && ball.len() >= 3);
 /// ```
 pub fn symmetries(mesh: &Mesh) -> Vec<Symmetry> {
     let mesh = &*coarse(mesh);

@@ -19,6 +19,21 @@ const PLANES: [f64; 2] = [0.0, 2.0];
 const TOLERANCE: f64 = 1e-3;
 
 /// The vertex colours of a mesh, for cameras at any distance.
+///
+/// ```
+/// use softrast_inverse::pose::{ColouredViews, VertexColours};
+/// use softrast_raster::{HostBackend, Projected, vertices};
+/// use softrast_tensor::{Tensor, numbers};
+///
+/// // A red face over the whole image is its own target.
+/// let corners = [[-9.0, -9.0, 2.0], [9.0, -9.0, 2.0], [0.0, 9.0, 2.0]];
+/// let seen = Projected::new(vertices::<HostBackend>(&corners, &Default::default()));
+/// let coat = VertexColours::new(&[[1.0, 0.0, 0.0]; 3], [[0, 1, 2]].into());
+/// let red = coat.hard(seen, 4);
+/// let views = ColouredViews::new(coat, red.clone(), Tensor::ones([1, 4, 4], &Default::default()));
+/// let [own, black] = [red.clone(), red * 0.0].map(|colours| numbers(views.loss(colours))[0]);
+/// assert!(own < 1e-9 && black > 1.0);
+/// ```
 #[derive(Debug)]
 pub struct VertexColours<B: RasterBackend> {
     colours: Vec<[f64; 3]>,

@@ -15,6 +15,18 @@ use crate::softness_file::stored::LARGEST_LOGARITHM;
 ///
 /// The error is that of the hard image, which needs no knowledge of the true scene. Not in the
 /// paper, whose softness is constant over a run.
+///
+/// ```
+/// use softrast_inverse::{Feedback, Follower, Place};
+///
+/// let run = |error: f64| -> Vec<Place> {
+///     let mut run: Follower = Feedback::START.follow(300);
+///     (0..300).map(|step| run.next((step > 0).then_some(error))).collect()
+/// };
+/// let (good, stuck) = (run(0.01), run(0.5));
+/// assert!(good[0].progress == 0.0 && good[299].progress == 1.0);
+/// assert!(!good.iter().any(|place| place.again) && stuck.iter().any(|place| place.again));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feedback {

@@ -12,6 +12,18 @@ use crate::softness_file::stored::LARGEST_LOGARITHM;
 ///
 /// Not in the paper, whose softness is the same at every step: a wide softness has a gradient far
 /// from the edges of the target, a narrow one a sharp image, and a run needs one after the other.
+///
+/// ```
+/// use softrast_inverse::{ScaleSchedule, ScheduledSoftness};
+/// use softrast_softness::{EdgeSoftness, Family};
+///
+/// let schedule = ScaleSchedule { knots: [0.1_f64, 0.001].map(f64::ln).into(), floor_px: 0.5 };
+/// let unit = ScheduledSoftness::constant(EdgeSoftness::new(Family::Logistic), 1.0);
+/// let floor = schedule.floor(&unit.softness, 64);
+/// assert_eq!(floor, 0.5 / 32.0);
+/// let softness = ScheduledSoftness { schedule: Some(schedule), ..unit };
+/// assert!((softness.scale_at(0.5, 64) - floor - 0.01).abs() < 1e-12);
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScaleSchedule {

@@ -14,6 +14,16 @@ use crate::softness_file::stored::{
 /// The image is that of the first softness: a sharp image with a wide gradient, which is not the derivative of the
 /// image. If the scale of the first follows a [`ScaleSchedule`], this one is evaluated at `d / scale(t)` too: it keeps
 /// its ratio to the first.
+///
+/// ```
+/// use softrast_inverse::{ScheduledSoftness, Surrogate};
+/// use softrast_softness::{EdgeSoftness, Family, Softness};
+///
+/// let edge = EdgeSoftness::new(Family::Logistic);
+/// let softness = ScheduledSoftness::decay(edge, 0.5, 0.125).with_surrogate_scale(1.0);
+/// let Surrogate { softness: wide, phi } = softness.surrogate_at(1.0, 64).unwrap();
+/// assert!((softness.width_at(1.0, 64) - 0.125).abs() < 1e-12 && (wide.scale(&phi) - 0.25).abs() < 1e-12);
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Surrogate<S = EdgeSoftness> {
@@ -33,6 +43,7 @@ pub struct Surrogate<S = EdgeSoftness> {
 ///
 /// let learned = ScheduledSoftness::learned("pose")?;
 /// assert!(learned.scale_at(1.0, 64) < learned.scale_at(0.0, 64));
+/// assert!(ScheduledSoftness::learned_names().any(|name| name == "pose"));
 /// # Ok::<(), softrast_inverse::SoftnessFileError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

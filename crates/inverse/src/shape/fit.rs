@@ -37,7 +37,7 @@ const MORE: f64 = 1.3;
 /// The object lies around the origin, as in the frame of [`frame_of_masks`](softrast_views::frame_of_masks).
 ///
 /// ```
-/// use softrast_inverse::shape::{ShapeFit, ViewOfShape};
+/// use softrast_inverse::shape::{FoundShape, ShapeFit, ViewOfShape};
 /// # use softrast_mesh::icosphere;
 /// # use softrast_raster::Pinhole;
 /// # use softrast_views::{Picture, View, coloured_pixels};
@@ -48,7 +48,7 @@ const MORE: f64 = 1.3;
 /// #     View { name: "ball".into(), picture: "".into(), mask, camera, distortion: None, off: 0.0 }
 /// # }).into();
 /// let views = views.iter().map(ViewOfShape::of_mask).collect::<anyhow::Result<Vec<_>>>()?;
-/// let found = ShapeFit::new(views).with_size(32).with_steps(60).run()?;
+/// let found: FoundShape = ShapeFit::new(views).with_size(32).with_steps(60).run()?;
 /// assert!((found.mesh.area() / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.1);
 /// # Ok::<(), anyhow::Error>(())
 /// ```

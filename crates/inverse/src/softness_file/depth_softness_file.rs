@@ -6,6 +6,14 @@ use softrast_softness::DepthSoftness;
 use super::stored::{SoftnessFileError, Stored, check_phi, learned, stored};
 
 /// A depth softness and its parameters, as stored in a JSON file; fixed over a run.
+///
+/// ```
+/// use softrast_inverse::{DepthSoftnessFile, SoftnessFileError};
+///
+/// let preset = DepthSoftnessFile::preset("occlusion")?;
+/// assert_eq!(preset.phi.len(), preset.depth_softness.parameters());
+/// # Ok::<(), SoftnessFileError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DepthSoftnessFile {

@@ -2,6 +2,14 @@ use std::{fmt, path::PathBuf, str::FromStr};
 
 /// A softness on a command line, `NAME|FILE.json`: a [`Family`](softrast_softness::Family) or a
 /// [`DepthSoftness`](softrast_softness::DepthSoftness) by its name, or a file.
+///
+/// ```
+/// use softrast_inverse::NameOrFile;
+/// use softrast_softness::Family;
+///
+/// assert_eq!("gauss".parse(), Ok(NameOrFile::Name(Family::Gauss)));
+/// assert_eq!("own.json".parse(), Ok(NameOrFile::<Family>::File("own.json".into())));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NameOrFile<T> {
     /// A name.

@@ -21,6 +21,8 @@ const FACING: f64 = 2.0;
 const COVERED: f64 = 0.6;
 
 /// A mesh with a texture that was found.
+///
+/// The [crate](crate) has an example.
 #[derive(Debug)]
 pub struct FoundTexture {
     /// The mesh, its faces as they were, without colours of vertices.

@@ -3,6 +3,8 @@ use std::f64::consts::TAU;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 /// Start of the triangles of one run.
+///
+/// See [`Scene`](super::Scene) for an example.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     /// Corners in NDC, three to a triangle.

@@ -17,6 +17,18 @@ const FROM_CENTROID: f64 = 1.5;
 /// The optimised θ is flat, `[6 triangles]`: x and y of every corner in NDC. There is no camera,
 /// and corners move freely, unlike in the released code, whose log-odds keep each coordinate on its
 /// side of the centre.
+///
+/// ```
+/// use softrast_inverse::triangles::{Instance, Scene};
+/// use softrast_raster::HostBackend;
+/// use softrast_tensor::numbers;
+///
+/// // A white picture.
+/// let scene = Scene::<HostBackend>::new(&[1.0; 64], &Instance::seeded(0, 4), 8);
+/// let hard = scene.hard(scene.vertices(scene.start()));
+/// let covered = numbers(hard.clone().mean())[0];
+/// assert!((numbers(scene.image_loss(hard))[0] - (1.0 - covered)).abs() < 1e-6);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scene<B: RasterBackend> {
     start: Tensor<B, 1>,
