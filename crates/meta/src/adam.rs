@@ -31,6 +31,18 @@ pub struct Adam {
 }
 
 /// State of [`Adam`] between steps.
+///
+/// ```
+/// use softrast_meta::{Adam, AdamState, Optimizer};
+/// use softrast_tensor::{NdArray, numbers, vector};
+///
+/// let (adam, theta) = (Adam::new(0.1), vector::<NdArray>(&[1.0, 1.0]));
+/// let state: AdamState<NdArray, 1> = adam.init(&theta);
+/// let (theta, state) = adam.step(theta, vector(&[5.0, -0.01]), state);
+/// // The first step has the length of the learning rate for any gradient.
+/// assert!(numbers(theta).iter().zip([0.9, 1.1]).all(|(a, b)| (a - b).abs() < 1e-5));
+/// assert_eq!(state.step, 1);
+/// ```
 #[derive(Clone, Debug)]
 pub struct AdamState<B: Backend, const D: usize> {
     /// Running mean of the gradient, not corrected.

@@ -9,6 +9,39 @@ use crate::{
 };
 
 /// One instance of a task to learn a softness on: the inner problem and its outer loss.
+///
+/// ```
+/// use softrast_meta::{BilevelProblem, InnerLoop, MetaEstimate, MetaGradient, Objective, OuterSteps, Sgd};
+/// use softrast_tensor::{Backend, NdArray, Tensor, numbers, vector};
+///
+/// /// A parabola around φ.
+/// struct Parabola;
+/// impl<B: Backend> Objective<B> for Parabola {
+///     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
+///         (theta - phi).powi_scalar(2)
+///     }
+/// }
+/// /// The squared distance to 1.
+/// struct ToOne;
+/// impl<B: Backend> Objective<B> for ToOne {
+///     fn loss(&self, theta: Tensor<B, 1>, _phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
+///         (theta - 1.0).powi_scalar(2)
+///     }
+/// }
+///
+/// let problem = BilevelProblem {
+///     objective: Parabola,
+///     outer_loss: ToOne,
+///     inner: InnerLoop { optimizer: Sgd { learning_rate: 0.25 }, steps: 1 },
+///     start: vector::<NdArray>(&[0.0]),
+///     outer_steps: OuterSteps::Last,
+/// };
+/// // A step halves the distance to φ: the outer loss is (φ / 2 - 1)².
+/// let exact = MetaGradient::Unrolled { clip: None };
+/// let estimate: MetaEstimate<NdArray> = exact.estimate(&problem, &vector(&[4.0]), 0);
+/// assert!((estimate.loss - 1.0).abs() < 1e-6);
+/// assert!((numbers(estimate.gradient)[0] - 1.0).abs() < 1e-6);
+/// ```
 #[derive(Clone, Debug)]
 pub struct BilevelProblem<B: Backend, P, R, O> {
     /// The inner loss, under the learned softness; on the level of autodiff that second derivatives need.

@@ -1,6 +1,8 @@
 use softrast_tensor::{Backend, Tensor, numbers};
 
 /// A meta-gradient and its diagnostics.
+///
+/// See [`BilevelProblem`](crate::BilevelProblem) for an example.
 #[derive(Clone, Debug)]
 pub struct MetaEstimate<B: Backend> {
     /// The outer loss.

@@ -37,6 +37,22 @@ impl<O: Optimizer> InnerLoop<O> {
 /// Descends along `gradient` (called with the step, counted from 0) from `theta` `[N]` and returns the final scene. `allowed` projects the
 /// scene after each step, and `see` receives the scene and the optimiser's state before the first step and after each.
 ///
+/// ```
+/// use std::convert::Infallible;
+///
+/// use softrast_meta::{InnerLoop, Sgd, descend};
+/// use softrast_tensor::{NdArray, Tensor, numbers, vector};
+///
+/// let halving = InnerLoop { optimizer: Sgd { learning_rate: 0.5 }, steps: 3 };
+/// let gradient = |_step, theta: &Tensor<NdArray, 1>| Ok::<_, Infallible>(theta.clone());
+/// let mut seen = Vec::new();
+/// let end = descend(&halving, vector(&[8.0]), gradient, |theta| theta, |_, theta, _| {
+///     seen.extend(numbers(theta.clone()));
+/// })?;
+/// assert_eq!((numbers(end), seen), (vec![1.0], vec![8.0, 4.0, 2.0, 1.0]));
+/// # Ok::<(), Infallible>(())
+/// ```
+///
 /// # Errors
 ///
 /// The error of `gradient`, which ends the descent.

@@ -64,4 +64,4 @@ pub use task_distribution::TaskDistribution;
 /// Compiles and runs the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-pub struct Readme;
+struct Readme;

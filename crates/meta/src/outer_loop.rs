@@ -10,6 +10,65 @@ use crate::{
 /// The outer loop: Adam on the mean meta-gradient of batches of instances.
 ///
 /// Source: Wu et al. 2024, Algorithm 1. Extensions: docs/notes.md, Meta-gradients: outer loop.
+///
+/// ```
+/// use softrast_meta::{
+///     Adam, Alone, Best, BilevelProblem, InnerLoop, LearnError, MetaGradient, Objective, OuterLoop, OuterSteps, Progress,
+///     Record, Sgd, TaskDistribution, Validation,
+/// };
+/// use softrast_tensor::{Backend, NdArray, Tensor, vector};
+///
+/// /// A parabola around φ.
+/// struct Parabola;
+/// impl<B: Backend> Objective<B> for Parabola {
+///     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
+///         (theta - phi).powi_scalar(2)
+///     }
+/// }
+/// /// The squared distance to 1.
+/// struct ToOne;
+/// impl<B: Backend> Objective<B> for ToOne {
+///     fn loss(&self, theta: Tensor<B, 1>, _phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
+///         (theta - 1.0).powi_scalar(2)
+///     }
+/// }
+/// /// Starts between 0 and 0.6, whose solutions should be 1.
+/// struct Tasks;
+/// impl TaskDistribution<NdArray> for Tasks {
+///     type Objective = Parabola;
+///     type OuterLoss = ToOne;
+///     type Optimizer = Sgd;
+///
+///     fn problem(&self, seed: u64, _phi: &Tensor<NdArray, 1>) -> BilevelProblem<NdArray, Parabola, ToOne, Sgd> {
+///         BilevelProblem {
+///             objective: Parabola,
+///             outer_loss: ToOne,
+///             inner: InnerLoop { optimizer: Sgd { learning_rate: 0.25 }, steps: 4 },
+///             start: vector(&[0.1 * (seed % 7) as f64]),
+///             outer_steps: OuterSteps::Last,
+///         }
+///     }
+/// }
+///
+/// let learner = OuterLoop {
+///     estimator: MetaGradient::default(),
+///     optimizer: Adam::new(0.1),
+///     clip: 1.0,
+///     steps: 20,
+///     batch: 2,
+///     seed: 100,
+///     validation: Validation { seed: 0, count: 3, every: 5, patience: None },
+/// };
+/// let mut progress = Progress::new(vec![0.0]);
+/// // Processes that share the work call the same method, each with its ranks.
+/// let first: Result<Option<Record>, LearnError> = learner.step_shared(&Tasks, &mut progress, &Alone);
+/// let before = first?.and_then(|record| record.validation_loss).unwrap();
+/// while learner.step(&Tasks, &mut progress)?.is_some() {}
+/// let Best { loss, phi, .. } = progress.best.as_ref().unwrap();
+/// assert!(*loss < 0.05 * before && (phi[0] - 1.0).abs() < 0.2);
+/// assert_eq!((progress.best_phi(), progress.check(20, 1)), (&phi[..], Ok(())));
+/// # Ok::<(), LearnError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OuterLoop {
     /// Estimator of the meta-gradient.

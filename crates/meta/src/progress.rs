@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// It holds no state of a random generator: instances are numbered consecutively, and everything
 /// random about an instance follows from its seed.
+///
+/// See [`OuterLoop`](crate::OuterLoop) for an example.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Progress {

@@ -11,6 +11,13 @@ pub trait Ranks {
 }
 
 /// A single process.
+///
+/// ```
+/// use softrast_meta::{Alone, Ranks};
+///
+/// assert_eq!((Alone.rank(), Alone.count()), (0, 1));
+/// assert_eq!(Alone.gather(&[1.0, 2.0]), [1.0, 2.0]);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Alone;
 

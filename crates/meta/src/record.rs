@@ -3,6 +3,8 @@ use serde::Serialize;
 /// Results of one outer step, all for the softness at its start.
 ///
 /// The last record of a run has no gradient: there is no step after it.
+///
+/// See [`OuterLoop`](crate::OuterLoop) for an example.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Record {
     /// Updates of φ before this step.

@@ -3,6 +3,8 @@ use softrast_tensor::{Autodiff, Backend, Tensor};
 use crate::{BilevelProblem, Objective, Optimizer};
 
 /// A distribution of instances to learn a softness on, indexed by seed.
+///
+/// See [`OuterLoop`](crate::OuterLoop) for an example.
 pub trait TaskDistribution<B: Backend> {
     /// Loss of the inner loops.
     type Objective: Objective<Autodiff<Autodiff<B>>>;
