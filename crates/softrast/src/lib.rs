@@ -75,9 +75,9 @@ pub use softrast_views as views;
 /// Compiles and runs the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-pub struct Readme;
+struct Readme;
 
 /// Compiles and runs the guide to colours.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/colour.md")]
-pub struct Colours;
+struct Colours;
