@@ -16,6 +16,9 @@ use crate::Surface;
 /// A mesh with movable vertices as a module of burn, for burn's own optimisers: its one parameter
 /// are the vertices, `[1, vertices, 3]` in world units.
 ///
+/// A start is a sphere around the object, `frame_of_masks(&views)?.mesh_to_world(&icosphere(3))`, or the visual hull of the masks. For a mesh
+/// of unit size, Adam at 0.01 and a weight of 0.01 for [`laplacian`](Self::laplacian) are a beginning.
+///
 /// ```
 /// use softrast_inverse::VertexModel;
 /// use softrast_mesh::{Mesh, icosphere};
@@ -47,7 +50,8 @@ impl<B: Backend> VertexModel<B> {
         }
     }
 
-    /// The vertices `[1, vertices, 3]`, as [`project`](softrast_raster::project) takes them.
+    /// The vertices `[1, vertices, 3]`, as [`project`](softrast_raster::project) takes them. They are the parameter itself, so
+    /// `vertices.grad(&loss.backward())` is the gradient with respect to them.
     pub fn vertices(&self) -> Tensor<B, 3> {
         self.vertices.val()
     }
