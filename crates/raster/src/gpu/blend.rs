@@ -10,7 +10,7 @@ use super::{
     of_pixel::{OF_PIXEL, OfPixel},
     parts::{Part, SLOTS},
     table::UNITS as WALKERS,
-    whole::{self, INFINITE, MARKS, NEGATIVE, SIZE, add_relative, mark, or_nan},
+    whole::{self, INFINITE, MARKS, NEGATIVE, SIZE, add_relative, mark},
 };
 
 /// Units of a cube, which share a part of a face.
@@ -213,8 +213,9 @@ pub(super) fn finish_pixels(
     let largest = largest(added.marks[(MARKS * own) as usize], log_behind.value);
     let shown = added.marks[(MARKS * own) as usize + 1];
     let moved = added.marks[(MARKS * own) as usize + 2];
-    let sum = total(&added.sums, of_pixel, 0usize, ONE, moved, added.face_count, kind);
-    let sum = Dual { value: or_nan(shown < INFINITE, sum.value), tangent: sum.tangent };
+    // Shares are relative to 1, all of them NaN if one is. A constant alone would not do: CUDA reinterprets the bits of variables only.
+    let unit = select(shown < INFINITE, ONE, shown);
+    let sum = total(&added.sums, of_pixel, 0usize, unit, moved, added.face_count, kind);
     let behind = log_behind.sub(Dual::constant(largest)).exp();
     let whole_weight = sum.add(behind);
     let per_total = whole_weight.recip();
