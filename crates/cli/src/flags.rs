@@ -47,7 +47,7 @@ pub struct Common {
     #[arg(long)]
     pub quiet: bool,
 
-    /// Compute on ndarray, flex or wgpu, if the program was built with it
+    /// Compute on ndarray, flex, wgpu or cuda, if the program was built with it
     #[arg(long, value_name = "NAME", help_heading = RARE)]
     pub backend: Option<String>,
 }

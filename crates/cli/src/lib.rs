@@ -3,8 +3,10 @@
 //! A program is a type that implements [`Task`] and a `main` of one call of [`main()`], or of [`main_of_two`]. [`MethodArgs`] are the flags
 //! of a method; together with a task they make a [`TaskExperiment`], which `softrast-lab` runs, stores and compares.
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("a program needs a backend: turn on one of the features ndarray, flex and wgpu");
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu", feature = "cuda")))]
+compile_error!(
+    "a program needs a backend: turn on one of the features ndarray, flex, wgpu and cuda"
+);
 
 mod backend;
 mod command_line;

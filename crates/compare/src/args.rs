@@ -53,7 +53,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "runs")]
     pub quick: bool,
 
-    /// Backend to compute on: ndarray, flex or wgpu, if the program was built with it
+    /// Backend to compute on: ndarray, flex, wgpu or cuda, if the program was built with it
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
 

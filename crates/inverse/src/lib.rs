@@ -64,8 +64,10 @@
 //! # Ok::<(), anyhow::Error>(())
 //! ```
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu", feature = "cuda")))]
+compile_error!(
+    "softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu, cuda"
+);
 
 mod baked;
 mod checkpoint;

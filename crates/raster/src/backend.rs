@@ -26,8 +26,8 @@ fn slice<F: Element>(data: &TensorData) -> &[F] {
 /// [`Cameras`](crate::Cameras) has an example of code that is generic over backends.
 #[diagnostic::on_unimplemented(
     message = "softrast does not draw on the backend `{Self}`",
-    note = "it draws on `NdArray`, `Flex` and `softrast_raster::Wgpu`, and on `Autodiff` of these, of the features ndarray, flex and wgpu",
-    note = "`Wgpu` of burn itself is another type where its feature `fusion` is on"
+    note = "it draws on `NdArray`, `Flex`, `softrast_raster::Wgpu` and `softrast_raster::Cuda`, and on `Autodiff` of these, of the features ndarray, flex, wgpu and cuda",
+    note = "`Wgpu` and `Cuda` of burn itself are other types where its feature `fusion` is on"
 )]
 pub trait RasterBackend: Backend {
     /// Whether small ops on small tensors are as fast as on the CPU: false for backends whose tensors are behind a queue, for which
@@ -92,7 +92,7 @@ fn on_host<B: RasterBackend, F: Numbers>(
     B::float_from_data(F::run_pass(op, pass, &slices, &dims), &device)
 }
 
-#[cfg(any(feature = "ndarray", feature = "wgpu"))]
+#[cfg(any(feature = "ndarray", feature = "gpu"))]
 mod ndarray {
     use bytemuck::checked::try_cast_slice;
     use softrast_tensor::{DType, Element, NdArray, NdArrayTensor};

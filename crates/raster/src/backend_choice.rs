@@ -4,12 +4,12 @@ use std::fmt;
 
 use crate::NoAdapter;
 
-/// Backend for small computations, whatever backend draws: parameters, supports, metrics. On the CPU, in f32; with `ndarray` or `wgpu` it
-/// also supports f64.
-#[cfg(any(feature = "ndarray", feature = "wgpu"))]
+/// Backend for small computations, whatever backend draws: parameters, supports, metrics. On the CPU, in f32; with `ndarray`, `wgpu` or `cuda`
+/// it also supports f64.
+#[cfg(any(feature = "ndarray", feature = "gpu"))]
 pub type HostBackend = softrast_tensor::NdArray<f32>;
 /// Backend for small computations, whatever backend draws: parameters, supports, metrics. On the CPU, in f32.
-#[cfg(not(any(feature = "ndarray", feature = "wgpu")))]
+#[cfg(not(any(feature = "ndarray", feature = "gpu")))]
 pub type HostBackend = softrast_tensor::Flex;
 
 /// A backend that programs compute on, in f32.
@@ -38,11 +38,13 @@ pub enum BackendChoice {
     Flex,
     /// wgpu: Vulkan, Metal or `WebGPU`, whichever the system has.
     Wgpu,
+    /// CUDA, on NVIDIA cards.
+    Cuda,
 }
 
 impl BackendChoice {
     /// All backends.
-    pub const ALL: [Self; 3] = [Self::NdArray, Self::Flex, Self::Wgpu];
+    pub const ALL: [Self; 4] = [Self::NdArray, Self::Flex, Self::Wgpu, Self::Cuda];
 
     /// Name on the command line, and of the feature that compiles it in.
     pub fn name(self) -> &'static str {
@@ -50,6 +52,7 @@ impl BackendChoice {
             Self::NdArray => "ndarray",
             Self::Flex => "flex",
             Self::Wgpu => "wgpu",
+            Self::Cuda => "cuda",
         }
     }
 
@@ -59,6 +62,7 @@ impl BackendChoice {
             Self::NdArray => "ndarray f32",
             Self::Flex => "flex f32",
             Self::Wgpu => "wgpu f32",
+            Self::Cuda => "cuda f32",
         }
     }
 
@@ -89,11 +93,15 @@ impl BackendChoice {
     ///
     /// # Errors
     ///
-    /// [`NoAdapter`] if it is wgpu and the system has no adapter.
+    /// [`NoAdapter`] if it is wgpu or cuda and the system lacks an adapter, a driver, or what compiles the kernels.
     pub fn set_up(self) -> Result<(), NoAdapter> {
         #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
         if self == Self::Wgpu {
             crate::adapter_name()?;
+        }
+        #[cfg(feature = "cuda")]
+        if self == Self::Cuda {
+            crate::cuda_device_name()?;
         }
         Ok(())
     }
@@ -109,7 +117,7 @@ impl fmt::Display for BackendChoice {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoBackend {
     /// No backend has this name.
-    #[error("there is no backend {0:?}: expected ndarray, flex or wgpu")]
+    #[error("there is no backend {0:?}: expected ndarray, flex, wgpu or cuda")]
     Unknown(String),
     /// Its feature was off when the program was built.
     #[error(
@@ -128,7 +136,7 @@ fn names(choices: &[BackendChoice]) -> String {
     choices.iter().map(|choice| choice.name()).collect::<Vec<_>>().join(" and ")
 }
 
-/// The backends whose features (`ndarray`, `flex`, `wgpu`) are on in the calling crate, as `&'static [BackendChoice]`.
+/// The backends whose features (`ndarray`, `flex`, `wgpu`, `cuda`) are on in the calling crate, as `&'static [BackendChoice]`.
 #[macro_export]
 macro_rules! compiled_backends {
     () => {
@@ -139,13 +147,15 @@ macro_rules! compiled_backends {
             $crate::BackendChoice::Flex,
             #[cfg(feature = "wgpu")]
             $crate::BackendChoice::Wgpu,
+            #[cfg(feature = "cuda")]
+            $crate::BackendChoice::Cuda,
         ]
     };
 }
 
 /// Evaluates `$work` with `$Backend` as an alias of the chosen backend: `on_backend!(choice, B => draw::<B>())`.
 ///
-/// Compiled once for each of `ndarray`, `flex` and `wgpu` whose feature is on in the calling crate, regardless of features that other
+/// Compiled once for each of `ndarray`, `flex`, `wgpu` and `cuda` whose feature is on in the calling crate, regardless of features that other
 /// crates turn on in this one.
 ///
 /// # Panics
@@ -168,6 +178,11 @@ macro_rules! on_backend {
             #[cfg(feature = "wgpu")]
             $crate::BackendChoice::Wgpu => {
                 type $Backend = $crate::Wgpu;
+                $work
+            }
+            #[cfg(feature = "cuda")]
+            $crate::BackendChoice::Cuda => {
+                type $Backend = $crate::Cuda;
                 $work
             }
             #[allow(unreachable_patterns, reason = "all features may be on")]
@@ -195,7 +210,7 @@ mod tests {
             missing.to_string(),
             "this program was built without wgpu, for ndarray and flex: build it with the feature wgpu"
         );
-        let unknown = BackendChoice::among(&[NdArray], Some("cuda")).unwrap_err();
+        let unknown = BackendChoice::among(&[NdArray], Some("opencl")).unwrap_err();
         assert!(unknown.to_string().contains("flex"), "{unknown}");
     }
 }

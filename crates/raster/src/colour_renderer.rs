@@ -62,7 +62,7 @@ pub struct ColourRenderer<S = EdgeSoftness> {
     tolerance: f64,
     culls: bool,
     cache: Cache<Prepared<S>>,
-    #[cfg(feature = "wgpu")]
+    #[cfg(feature = "gpu")]
     topology: crate::gpu::Topology,
 }
 
@@ -120,7 +120,7 @@ impl<S: Softness> ColourRenderer<S> {
             tolerance,
             culls: false,
             cache: Cache::default(),
-            #[cfg(feature = "wgpu")]
+            #[cfg(feature = "gpu")]
             topology: Default::default(),
         }
     }
@@ -138,7 +138,7 @@ impl<S: Softness> ColourRenderer<S> {
         Self {
             room: faces.len().next_power_of_two(),
             faces,
-            #[cfg(feature = "wgpu")]
+            #[cfg(feature = "gpu")]
             topology: Default::default(),
             ..self.clone()
         }
@@ -339,7 +339,7 @@ impl<S: Softness> ColourRenderer<S> {
             tolerance: 0.5 * self.tolerance,
             culls: self.culls,
             kept: None,
-            #[cfg(feature = "wgpu")]
+            #[cfg(feature = "gpu")]
             topology: self.topology.clone(),
         }
     }

@@ -39,8 +39,10 @@
 //! assert!(gradient < 1e-3 && wide > 1.0);
 //! ```
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("softrast-raster needs a backend: turn on one of the features ndarray, flex, wgpu");
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu", feature = "cuda")))]
+compile_error!(
+    "softrast-raster needs a backend: turn on one of the features ndarray, flex, wgpu, cuda"
+);
 
 mod attributes;
 mod backend;
@@ -50,7 +52,7 @@ mod camera;
 mod colour;
 mod colour_renderer;
 mod curve;
-#[cfg(feature = "wgpu")]
+#[cfg(feature = "gpu")]
 mod gpu;
 mod hard;
 mod limits;
@@ -83,6 +85,8 @@ pub use colour_renderer::ColourRenderer;
 pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 pub use gpu::adapter_name;
+#[cfg(feature = "cuda")]
+pub use gpu::{Cuda, cuda_device_name};
 pub use hard::{hard_coverage, hard_silhouette, nearest_faces};
 pub use limits::NEAR;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};

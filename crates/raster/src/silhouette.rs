@@ -92,7 +92,7 @@ impl Rasterizer {
             size: self.size,
             near: NEAR,
             kept: None,
-            #[cfg(feature = "wgpu")]
+            #[cfg(feature = "gpu")]
             on_gpu: crate::gpu::SumOnGpu::new(t_conorm.is_like_depths()),
         };
         Silhouette { softness, profile, op }
@@ -222,7 +222,7 @@ impl<S: Softness> Silhouette<S> {
     pub(crate) fn with_faces(&self, faces: Arc<[[u32; 3]]>) -> Self {
         let op = ProfileSum {
             faces,
-            #[cfg(feature = "wgpu")]
+            #[cfg(feature = "gpu")]
             on_gpu: crate::gpu::SumOnGpu::new(self.profile.t_conorm().is_like_depths()),
             ..self.op.clone()
         };

@@ -118,7 +118,7 @@ impl TConorm {
 
     /// Whether `g(s)` is the optical depth of s or close to it: then it increases as slowly as that near 1, and near 0 it is at least a
     /// tenth of s. Others may be powers of s, whose magnitudes floats can represent and a fixed unit cannot.
-    #[cfg(feature = "wgpu")]
+    #[cfg(feature = "gpu")]
     pub(crate) fn is_like_depths(self) -> bool {
         match self {
             Self::Probabilistic | Self::Einstein => true,

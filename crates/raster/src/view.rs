@@ -90,7 +90,7 @@ fn by_series<B: Backend, const D: usize>(radians: Tensor<B, D>) -> [Tensor<B, D>
     [sin * cos * 2.0, versine.neg() + 1.0]
 }
 
-#[cfg(all(test, any(feature = "ndarray", feature = "wgpu")))]
+#[cfg(all(test, any(feature = "ndarray", feature = "gpu")))]
 mod tests {
     use softrast_tensor::{Autodiff, NdArray, numbers, vector};
 

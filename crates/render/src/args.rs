@@ -83,7 +83,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE.png|disk:x,y,r")]
     pub(crate) target: Option<Target>,
 
-    /// Backend to draw on: ndarray, flex or wgpu, if the program was built with it; by default the first of these
+    /// Backend to draw on: ndarray, flex, wgpu or cuda, if the program was built with it; by default the first of these
     #[arg(long, value_name = "NAME", conflicts_with = "reference")]
     pub(crate) backend: Option<String>,
 

@@ -3,8 +3,8 @@
 //! For silhouettes with a target, it also computes the mean squared difference over views and pixels, and its gradient with respect to the
 //! vertices. `--reference` does the same in f64 tensor ops over every pixel-face pair, as a reference for the fused op.
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("render needs a backend: turn on one of the features ndarray, flex and wgpu");
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu", feature = "cuda")))]
+compile_error!("render needs a backend: turn on one of the features ndarray, flex, wgpu and cuda");
 
 mod args;
 mod coloured;

@@ -120,7 +120,7 @@ fn bad_input_is_one_line_and_leaves_no_picture() {
         (&[&mesh, "--softness", "missing.json"], 1, "missing.json"),
         (&[&mesh, "--softness", "a.json", "--squared"], 2, "a file has its own"),
         (&[&mesh, "--t-conorm", "max"], 2, "use probabilistic, einstein"),
-        (&[&mesh, "--backend", "cuda"], 2, "expected ndarray, flex or wgpu"),
+        (&[&mesh, "--backend", "opencl"], 2, "expected ndarray, flex, wgpu or cuda"),
         (&[&mesh, "--target", &mesh], 1, "cannot read the target"),
         (&[&mesh, "--out", blocked], 1, "choose another with --out"),
     ];

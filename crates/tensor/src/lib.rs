@@ -4,7 +4,7 @@
 //! types are burn's own: a tensor of burn 0.21 is a tensor here. Networks use burn's modules and optimisers through `burn`, the whole
 //! crate, which the Cargo feature `burn` compiles.
 //!
-//! The Cargo features `ndarray`, `flex` and `wgpu` compile the backends of these names.
+//! The Cargo features `ndarray`, `flex`, `wgpu` and `cuda` compile the backends of these names.
 //!
 //! ```
 //! use softrast_tensor::{Autodiff, NdArray, numbers, vector};
@@ -47,15 +47,30 @@ pub mod autodiff {
     };
 }
 
-/// The backend for GPUs, and the types of its kernels.
+/// The backend for GPUs, generic over the runtime, and the types of its kernels.
+#[cfg(feature = "gpu")]
+pub mod gpu {
+    #[doc(no_inline)]
+    pub use burn_cubecl::{
+        BoolElement, CubeBackend, CubeRuntime, cubecl, kernel::into_contiguous,
+        ops::numeric::zeros_client, tensor::CubeTensor,
+    };
+}
+
+/// The runtime of the backend for GPUs over Vulkan, Metal, DirectX and `WebGPU`.
 #[cfg(feature = "wgpu")]
 pub mod wgpu {
     #[doc(no_inline)]
     pub use burn::backend::wgpu::{
-        CubeBackend, CubeTensor, WgpuDevice, WgpuRuntime,
+        WgpuDevice, WgpuRuntime,
         graphics::{AutoGraphicsApi, GraphicsApi},
         init_setup, init_setup_async,
     };
+}
+
+/// The runtime of the backend for GPUs over CUDA.
+#[cfg(feature = "cuda")]
+pub mod cuda {
     #[doc(no_inline)]
-    pub use burn_cubecl::{cubecl, kernel::into_contiguous, ops::numeric::zeros_client};
+    pub use burn_cubecl::cubecl::cuda::{CudaDevice, CudaRuntime, install};
 }

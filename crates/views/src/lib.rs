@@ -42,8 +42,10 @@
 //! # anyhow::Ok(())
 //! ```
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("softrast-views needs a backend: turn on one of the features ndarray, flex, wgpu");
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu", feature = "cuda")))]
+compile_error!(
+    "softrast-views needs a backend: turn on one of the features ndarray, flex, wgpu, cuda"
+);
 
 mod atlas;
 mod cameras;

@@ -221,7 +221,7 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("--resolution none", 2, "expected full, auto"),
         ("--tolerance 1", 2, "below 1"),
         ("learn --resolution 32", 2, "learn draws at --size"),
-        ("--backend cuda", 2, "expected ndarray, flex or wgpu"),
+        ("--backend opencl", 2, "expected ndarray, flex, wgpu or cuda"),
         ("--mesh missing.obj", 1, "missing.obj"),
         ("--colour --mesh missing.obj", 1, "missing.obj"),
         ("--mesh --colour", 2, "a value is required for '--mesh"),

@@ -18,7 +18,7 @@ pub(crate) struct CommandLine {
     #[command(subcommand)]
     pub(crate) command: Command,
 
-    /// Backend: flex, ndarray or wgpu, if the program was built with it; by default the first of
+    /// Backend: flex, ndarray, wgpu or cuda, if the program was built with it; by default the first of
     /// these that is available.
     #[arg(long, global = true, value_name = "NAME")]
     pub(crate) backend: Option<String>,

@@ -14,8 +14,10 @@
 //!
 //! **Data.** [`Procedural`] generates shapes; [`NpzFolder`] reads the public files of earlier papers.
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("reconstruct needs a backend: turn on one of the features flex, ndarray and wgpu");
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu", feature = "cuda")))]
+compile_error!(
+    "reconstruct needs a backend: turn on one of the features flex, ndarray, wgpu and cuda"
+);
 
 mod args;
 mod checkpoint;

@@ -1,7 +1,8 @@
 use std::sync::OnceLock;
 
-use softrast_tensor::wgpu::{
-    AutoGraphicsApi, GraphicsApi, WgpuDevice, WgpuRuntime, cubecl::Runtime, init_setup,
+use softrast_tensor::{
+    gpu::cubecl::Runtime,
+    wgpu::{AutoGraphicsApi, GraphicsApi, WgpuDevice, WgpuRuntime, init_setup},
 };
 
 use crate::NoAdapter;
@@ -12,15 +13,15 @@ use crate::NoAdapter;
 ///
 /// # Errors
 ///
-/// [`NoAdapter`] if the system has none.
+/// [`NoAdapter::Wgpu`] if the system has none.
 pub fn adapter_name() -> Result<&'static str, NoAdapter> {
     static NAME: OnceLock<Result<String, NoAdapter>> = OnceLock::new();
     let name = NAME.get_or_init(|| {
         if WgpuRuntime::enumerate_all_devices(&AutoGraphicsApi::backend()).is_empty() {
-            return Err(NoAdapter);
+            return Err(NoAdapter::Wgpu);
         }
         let setup = init_setup::<AutoGraphicsApi>(&WgpuDevice::default(), Default::default());
         Ok(setup.adapter.get_info().name)
     });
-    name.as_deref().map_err(|&none| none)
+    name.as_deref().map_err(Clone::clone)
 }

@@ -6,11 +6,11 @@ use softrast_kernel::{
 };
 use softrast_tensor::{
     DType, FloatTensorOps, Slice, TensorMetadata,
-    wgpu::{WgpuRuntime, cubecl::prelude::*, into_contiguous},
+    gpu::{CubeRuntime, cubecl::prelude::*, into_contiguous},
 };
 
 use super::{
-    backend::Wgpu,
+    backend::Floats,
     blend::{
         self, AddedLaunch, add_shares, blend_cubics, blend_faces, find_largest, finish_pixels,
         sum_background, summed,
@@ -31,14 +31,14 @@ use crate::{ProfileSum, SoftBlend};
 const LOWEST: f32 = -1e30;
 
 /// Inputs on the device.
-pub(super) struct Blend<'a> {
+pub(super) struct Blend<'a, R: CubeRuntime> {
     op: &'a SoftBlend,
-    pass: Pass<'a>,
+    pass: Pass<'a, R>,
     /// Tables, attributes, background and texture.
-    numbers: Buffer,
-    direction: Option<Buffer>,
+    numbers: Buffer<R>,
+    direction: Option<Buffer<R>>,
     /// Entries of the attributes at the corners of faces, and the corners of each entry.
-    entries: OnDevice,
+    entries: OnDevice<R>,
     entry_count: usize,
     channels: usize,
     /// Whether all views share the attributes.
@@ -48,21 +48,21 @@ pub(super) struct Blend<'a> {
 }
 
 /// Accumulator of a gradient of texels.
-struct Texels {
+struct Texels<R: CubeRuntime> {
     /// The measured words, then two words for each of `count` numbers.
-    sums: Buffer,
+    sums: Buffer<R>,
     count: usize,
 }
 
 /// Results of a backward pass.
-pub(super) struct Gradient {
-    pub(super) vertices: Buffer,
-    pub(super) attributes: Buffer,
-    pub(super) tables: Option<Buffer>,
-    pub(super) background: Buffer,
-    pub(super) texture: Option<Buffer>,
+pub(super) struct Gradient<R: CubeRuntime> {
+    pub(super) vertices: Buffer<R>,
+    pub(super) attributes: Buffer<R>,
+    pub(super) tables: Option<Buffer<R>>,
+    pub(super) background: Buffer<R>,
+    pub(super) texture: Option<Buffer<R>>,
     /// The derivative of the image, in a pass of second order.
-    pub(super) image: Buffer,
+    pub(super) image: Buffer<R>,
 }
 
 /// A `ProfileSum` that only provides the support of faces for the colour op: that of the edge table.
@@ -78,40 +78,43 @@ pub(super) fn as_sum(op: &SoftBlend) -> ProfileSum {
     }
 }
 
-impl<'a> Blend<'a> {
+impl<'a, R: CubeRuntime> Blend<'a, R> {
     /// `inputs` are vertices, attributes, tables, background and, if there is one, the texture; `direction` their derivatives, flat, in a pass
     /// of second order.
     pub(super) fn new(
         op: &'a SoftBlend,
         sum: &'a ProfileSum,
-        inputs: Vec<Buffer>,
-        direction: Option<Buffer>,
+        inputs: Vec<Buffer<R>>,
+        direction: Option<Buffer<R>>,
     ) -> Self {
         let lengths: Vec<usize> = inputs.iter().map(|input| input.shape().num_elements()).collect();
         let (views, entry_count) = (inputs[1].shape()[0], inputs[1].shape()[1]);
         let channels = lengths[3] - 1;
-        let flat = |tensor: Buffer| {
+        let flat = |tensor: Buffer<R>| {
             let length = tensor.shape().num_elements();
-            Wgpu::float_reshape(tensor, [length].into())
+            Floats::<R>::float_reshape(tensor, [length].into())
         };
         let starts = [lengths[2], lengths[2] + lengths[1], lengths[2] + lengths[1] + lengths[3]];
         let mut inputs = inputs.into_iter();
         let vertices = inputs.next().expect("vertices");
         // The tables come first.
-        let mut numbers: Vec<Buffer> = inputs.map(flat).collect();
+        let mut numbers: Vec<Buffer<R>> = inputs.map(flat).collect();
         numbers.swap(0, 1);
-        let numbers = Wgpu::float_cat(numbers, 0);
+        let numbers = Floats::<R>::float_cat(numbers, 0);
         let direction = direction.map(|direction| {
             let mut start = 0;
-            let mut parts: Vec<Buffer> = lengths
+            let mut parts: Vec<Buffer<R>> = lengths
                 .iter()
                 .map(|length| {
                     start += length;
-                    Wgpu::float_slice(direction.clone(), &[Slice::from(start - length..start)])
+                    Floats::<R>::float_slice(
+                        direction.clone(),
+                        &[Slice::from(start - length..start)],
+                    )
                 })
                 .collect();
             parts.swap(1, 2);
-            into_contiguous(Wgpu::float_cat(parts, 0))
+            into_contiguous(Floats::<R>::float_cat(parts, 0))
         });
         let pass = Pass::new(sum, vertices, numbers, direction.clone());
         let numbers_of_entry = if op.texture.is_some() { 2 } else { channels };
@@ -129,7 +132,7 @@ impl<'a> Blend<'a> {
     }
 
     /// The image, flat.
-    pub(super) fn image(&self) -> Buffer {
+    pub(super) fn image(&self) -> Buffer<R> {
         let image = self.pass.buffer(self.image_length(), DType::F32);
         let unused = self.pass.buffer(1, DType::F32);
         for faces in self.pass.prepared() {
@@ -140,7 +143,12 @@ impl<'a> Blend<'a> {
 
     /// Gradients of `Σ upstream · image` with respect to vertices, attributes, tables, background and texture, flat; in a pass of second
     /// order their derivatives, and that of the image. Tables and texture are included if they are wanted.
-    pub(super) fn gradient(&self, upstream: Buffer, of_tables: bool, of_texels: bool) -> Gradient {
+    pub(super) fn gradient(
+        &self,
+        upstream: Buffer<R>,
+        of_tables: bool,
+        of_texels: bool,
+    ) -> Gradient<R> {
         let upstream = into_contiguous(upstream);
         let (views, channels) = (self.pass.views, self.channels);
         let numbers = self.kind().numbers();
@@ -183,8 +191,8 @@ impl<'a> Blend<'a> {
         let entries = numbers * self.entry_count;
         let attributes = match self.shared {
             true => {
-                let by_view = Wgpu::float_reshape(attributes, [views, entries].into());
-                Wgpu::float_reshape(Wgpu::float_sum_dim(by_view, 0), [entries].into())
+                let by_view = Floats::<R>::float_reshape(attributes, [views, entries].into());
+                Floats::<R>::float_reshape(Floats::<R>::float_sum_dim(by_view, 0), [entries].into())
             }
             false => attributes,
         };
@@ -193,7 +201,7 @@ impl<'a> Blend<'a> {
     }
 
     /// The gradient of the background, summed over all pixels.
-    fn background(&self, pixels: Buffer) -> Buffer {
+    fn background(&self, pixels: Buffer<R>) -> Buffer<R> {
         let (count, numbers) = (self.pass.pixels(), self.channels + 1);
         let cubes = count.div_ceil(16 * table::UNITS as usize).clamp(1, 256);
         let [partial, out] = [cubes * numbers, numbers].map(|n| self.pass.buffer(n, DType::F32));
@@ -227,10 +235,10 @@ impl<'a> Blend<'a> {
     /// Draws some views: writes to `image`, and with `pull` the intermediates of gradients to `pixels`.
     fn write_pixels(
         &self,
-        faces: &Prepared,
-        upstream: &Buffer,
-        pixels: &Buffer,
-        image: &Buffer,
+        faces: &Prepared<R>,
+        upstream: &Buffer<R>,
+        pixels: &Buffer<R>,
+        image: &Buffer<R>,
         pull: bool,
     ) {
         let (client, kind) = (&self.pass.client, self.kind());
@@ -284,7 +292,12 @@ impl<'a> Blend<'a> {
         );
     }
 
-    fn write_faces(&self, faces: &Prepared, upstream: &Buffer, pixels: &Buffer) -> Buffer {
+    fn write_faces(
+        &self,
+        faces: &Prepared<R>,
+        upstream: &Buffer<R>,
+        pixels: &Buffer<R>,
+    ) -> Buffer<R> {
         let groups = faces.views * self.op.faces.len() + SLOTS as usize;
         let of_faces = self.pass.buffer(self.of_face() * groups, DType::F32);
         blend_faces::launch(
@@ -303,10 +316,10 @@ impl<'a> Blend<'a> {
     /// Adds the gradient of both tables, of `rows` rows in total, to `partial`.
     fn add_cubics(
         &self,
-        faces: &Prepared,
-        upstream: &Buffer,
-        pixels: &Buffer,
-        partial: &Partial,
+        faces: &Prepared<R>,
+        upstream: &Buffer<R>,
+        pixels: &Buffer<R>,
+        partial: &Partial<R>,
         rows: usize,
     ) {
         blend_cubics::launch(
@@ -323,7 +336,7 @@ impl<'a> Blend<'a> {
     }
 
     /// A zero gradient of the texture.
-    fn no_texels(&self) -> Texels {
+    fn no_texels(&self) -> Texels<R> {
         let count = self.numbers.shape().num_elements() - self.starts[2];
         Texels { sums: self.pass.zeros(MEASURED + 2 * count, DType::U32), count }
     }
@@ -331,10 +344,10 @@ impl<'a> Blend<'a> {
     /// With `measure` computes the largest magnitude of a term, else sums all terms.
     fn add_texels(
         &self,
-        faces: &Prepared,
-        upstream: &Buffer,
-        pixels: &Buffer,
-        texels: &Texels,
+        faces: &Prepared<R>,
+        upstream: &Buffer<R>,
+        pixels: &Buffer<R>,
+        texels: &Texels<R>,
         measure: bool,
     ) {
         sum_texels::launch(
@@ -351,7 +364,7 @@ impl<'a> Blend<'a> {
     }
 
     /// The summed terms, as floats.
-    fn floats(&self, texels: Texels) -> Buffer {
+    fn floats(&self, texels: Texels<R>) -> Buffer<R> {
         let gradient = self.pass.buffer(texels.count, DType::F32);
         texel_floats::launch(
             &self.pass.client,
@@ -365,7 +378,7 @@ impl<'a> Blend<'a> {
     }
 
     /// The inputs of the kernels.
-    fn drawn(&self, faces: &Prepared) -> BlendInputsLaunch<WgpuRuntime> {
+    fn drawn(&self, faces: &Prepared<R>) -> BlendInputsLaunch<R> {
         BlendInputsLaunch::new(
             faces.corners.clone().into_array_arg(),
             faces.reaches.clone().into_array_arg(),
@@ -382,7 +395,7 @@ impl<'a> Blend<'a> {
     }
 
     /// One cube per part of a face.
-    fn parts(&self, faces: &Prepared) -> CubeCount {
+    fn parts(&self, faces: &Prepared<R>) -> CubeCount {
         let groups = faces.views * self.op.faces.len() + SLOTS as usize;
         self.pass.cubes(groups * blend::UNITS as usize, blend::UNITS)
     }
@@ -393,7 +406,7 @@ impl<'a> Blend<'a> {
     }
 
     /// The direction; without one any buffer, since it is not read.
-    fn direction(&self) -> Buffer {
+    fn direction(&self) -> Buffer<R> {
         self.direction.as_ref().unwrap_or(&self.numbers).clone()
     }
 
@@ -415,7 +428,7 @@ impl<'a> Blend<'a> {
         }
     }
 
-    fn weights(&self) -> BlendParamsLaunch<WgpuRuntime> {
+    fn weights(&self) -> BlendParamsLaunch<R> {
         let op = self.op;
         let (depth, least) = match op.depth {
             DepthGrid::Table(grid) => (grid, 0.0),

@@ -1,16 +1,16 @@
 //! Passes of the small ops around the rasterizer: the launches of their kernels and their buffers.
 
 use softrast_tensor::{
-    DType, FloatTensor, FloatTensorOps, Shape, TensorMetadata,
-    wgpu::{
-        CubeTensor, WgpuRuntime,
+    DType, FloatTensorOps, Shape, TensorMetadata,
+    gpu::{
+        CubeRuntime, CubeTensor,
         cubecl::{calculate_cube_count_elemwise, prelude::*},
         into_contiguous,
     },
 };
 
 use super::{
-    backend::Wgpu,
+    backend::Floats,
     camera::{self, SeenLaunch, orbit_matrices, perspective, to_matrices, to_orbits, to_points},
     flat::{length, whole_direction},
     losses::{
@@ -22,19 +22,23 @@ use super::{
 use crate::{ElementaryOp, Pass};
 
 /// Inputs on the device.
-struct Elementary {
-    inputs: Vec<Buffer>,
+struct Elementary<R: CubeRuntime> {
+    inputs: Vec<Buffer<R>>,
     /// Derivatives of all inputs, flat, in a pass of second order.
-    direction: Option<Buffer>,
+    direction: Option<Buffer<R>>,
 }
 
 /// Runs a pass of an op.
-pub(super) fn run(op: ElementaryOp, pass: &Pass, tensors: Vec<Buffer>) -> FloatTensor<Wgpu> {
+pub(super) fn run<R: CubeRuntime>(
+    op: ElementaryOp,
+    pass: &Pass,
+    tensors: Vec<Buffer<R>>,
+) -> Buffer<R> {
     let count = match op {
         ElementaryOp::OrbitMatrix | ElementaryOp::Coverage => 1,
         ElementaryOp::Perspective | ElementaryOp::SquaredError | ElementaryOp::Iou => 2,
     };
-    let mut inputs: Vec<Buffer> = tensors.into_iter().map(into_contiguous).collect();
+    let mut inputs: Vec<Buffer<R>> = tensors.into_iter().map(into_contiguous).collect();
     let mut rest = inputs.split_off(count).into_iter();
     let lengths: Vec<usize> = inputs.iter().map(length).collect();
     let mut next = || rest.next().expect("all inputs of the pass");
@@ -42,7 +46,7 @@ pub(super) fn run(op: ElementaryOp, pass: &Pass, tensors: Vec<Buffer>) -> FloatT
         Pass::Forward => {
             let own = Elementary { inputs, direction: None };
             let shape = own.shape(op);
-            Wgpu::float_reshape(own.forward(op), shape)
+            Floats::<R>::float_reshape(own.forward(op), shape)
         }
         Pass::Vjp { wanted } => {
             let upstream = next();
@@ -63,21 +67,21 @@ pub(super) fn run(op: ElementaryOp, pass: &Pass, tensors: Vec<Buffer>) -> FloatT
 }
 
 /// Concatenates flat tensors.
-fn joined(mut parts: Vec<Buffer>) -> Buffer {
-    if parts.len() == 1 { parts.remove(0) } else { Wgpu::float_cat(parts, 0) }
+fn joined<R: CubeRuntime>(mut parts: Vec<Buffer<R>>) -> Buffer<R> {
+    if parts.len() == 1 { parts.remove(0) } else { Floats::<R>::float_cat(parts, 0) }
 }
 
-impl Elementary {
+impl<R: CubeRuntime> Elementary<R> {
     fn second(&self) -> bool {
         self.direction.is_some()
     }
 
     /// The direction; without one any buffer, since it is not read.
-    fn direction(&self) -> Buffer {
+    fn direction(&self) -> Buffer<R> {
         self.direction.as_ref().unwrap_or(&self.inputs[0]).clone()
     }
 
-    fn client(&self) -> &ComputeClient<WgpuRuntime> {
+    fn client(&self) -> &ComputeClient<R> {
         &self.inputs[0].client
     }
 
@@ -86,7 +90,7 @@ impl Elementary {
     }
 
     /// An uninitialised flat buffer.
-    fn buffer(&self, length: usize) -> Buffer {
+    fn buffer(&self, length: usize) -> Buffer<R> {
         let handle = self.client().empty(length * DType::F32.size());
         let device = self.inputs[0].device.clone();
         CubeTensor::new_contiguous(
@@ -114,7 +118,7 @@ impl Elementary {
     }
 
     /// The result, flat; in a pass of second order its derivative.
-    fn forward(&self, op: ElementaryOp) -> Buffer {
+    fn forward(&self, op: ElementaryOp) -> Buffer<R> {
         let out = self.buffer(self.shape(op).num_elements());
         let (client, views, second) = (self.client(), self.views(), self.second());
         let (cube, jobs) = (CubeDim::new_1d(CUBE), length(&out));
@@ -163,7 +167,7 @@ impl Elementary {
     }
 
     /// The gradients of `Σ upstream · result` that are wanted, each flat; in a pass of second order their derivatives.
-    fn gradients(&self, op: ElementaryOp, upstream: &Buffer, wanted: &[bool]) -> Vec<Buffer> {
+    fn gradients(&self, op: ElementaryOp, upstream: &Buffer<R>, wanted: &[bool]) -> Vec<Buffer<R>> {
         if !wanted.contains(&true) {
             return Vec::new();
         }
@@ -176,9 +180,9 @@ impl Elementary {
         &self,
         op: ElementaryOp,
         which: usize,
-        upstream: &Buffer,
-        totals: &Buffer,
-    ) -> Buffer {
+        upstream: &Buffer<R>,
+        totals: &Buffer<R>,
+    ) -> Buffer<R> {
         let jobs = length(&self.inputs[which]);
         let out = self.buffer(jobs);
         let (client, views, second) = (self.client(), self.views(), self.second());
@@ -243,7 +247,7 @@ impl Elementary {
     }
 
     /// Points and matrices.
-    fn seen(&self) -> SeenLaunch<WgpuRuntime> {
+    fn seen(&self) -> SeenLaunch<R> {
         let [points, matrices] = &self.inputs[..] else { panic!("points and matrices") };
         let (own, count) = (points.shape()[0], points.shape()[1]);
         SeenLaunch::new(
@@ -267,10 +271,10 @@ impl Elementary {
     }
 
     /// Two images per view.
-    fn compared(&self) -> ComparedLaunch<WgpuRuntime> {
+    fn compared(&self) -> ComparedLaunch<R> {
         let [one, other] = &self.inputs[..] else { panic!("two images") };
         let pixels = self.pixels();
-        let step = |image: &Buffer| if image.shape()[0] == 1 { 0 } else { pixels as u32 };
+        let step = |image: &Buffer<R>| if image.shape()[0] == 1 { 0 } else { pixels as u32 };
         let (one_step, other_step) = (step(one), step(other));
         ComparedLaunch::new(
             one.clone().into_array_arg(),
@@ -286,7 +290,7 @@ impl Elementary {
     }
 
     /// Sums over the pixels of each view.
-    fn totals(&self, op: ElementaryOp) -> Buffer {
+    fn totals(&self, op: ElementaryOp) -> Buffer<R> {
         let (views, blocks) = (self.views(), self.blocks());
         let [partial, totals] = [4 * views * blocks, 4 * views].map(|length| self.buffer(length));
         let cube = CubeDim::new_1d(losses::UNITS);

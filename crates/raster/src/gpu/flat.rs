@@ -1,19 +1,19 @@
 //! Tensors that hold several, concatenated.
 
-use softrast_tensor::{FloatDType, FloatTensor, FloatTensorOps, Slice, TensorMetadata};
+use softrast_tensor::{FloatDType, FloatTensorOps, Slice, TensorMetadata, gpu::CubeRuntime};
 
-use super::backend::Wgpu;
+use super::{backend::Floats, prepared::Buffer};
 
-pub(super) fn length(tensor: &FloatTensor<Wgpu>) -> usize {
+pub(super) fn length<R: CubeRuntime>(tensor: &Buffer<R>) -> usize {
     tensor.shape().num_elements()
 }
 
 /// The wanted parts of a flat tensor, concatenated.
-pub(super) fn parts(
-    flat: FloatTensor<Wgpu>,
+pub(super) fn parts<R: CubeRuntime>(
+    flat: Buffer<R>,
     lengths: &[usize],
     wanted: &[bool],
-) -> FloatTensor<Wgpu> {
+) -> Buffer<R> {
     if wanted.iter().all(|&wanted| wanted) {
         return flat;
     }
@@ -21,30 +21,33 @@ pub(super) fn parts(
     let mut chosen = Vec::new();
     for (&length, &wanted) in lengths.iter().zip(wanted) {
         if wanted {
-            chosen.push(Wgpu::float_slice(flat.clone(), &[Slice::from(start..start + length)]));
+            chosen.push(Floats::<R>::float_slice(
+                flat.clone(),
+                &[Slice::from(start..start + length)],
+            ));
         }
         start += length;
     }
-    if chosen.len() == 1 { chosen.remove(0) } else { Wgpu::float_cat(chosen, 0) }
+    if chosen.len() == 1 { chosen.remove(0) } else { Floats::<R>::float_cat(chosen, 0) }
 }
 
 /// The inverse of [`parts`]: zeros in place of missing parts.
-pub(super) fn whole_direction(
-    flat: FloatTensor<Wgpu>,
+pub(super) fn whole_direction<R: CubeRuntime>(
+    flat: Buffer<R>,
     lengths: &[usize],
     there: &[bool],
-) -> FloatTensor<Wgpu> {
+) -> Buffer<R> {
     if there.iter().all(|&there| there) {
         return flat;
     }
-    let device = Wgpu::float_device(&flat);
+    let device = Floats::<R>::float_device(&flat);
     let mut start = 0;
     let part = |(&length, &there): (&usize, &bool)| {
         if !there {
-            return Wgpu::float_zeros([length].into(), &device, FloatDType::F32);
+            return Floats::<R>::float_zeros([length].into(), &device, FloatDType::F32);
         }
         start += length;
-        Wgpu::float_slice(flat.clone(), &[Slice::from(start - length..start)])
+        Floats::<R>::float_slice(flat.clone(), &[Slice::from(start - length..start)])
     };
-    Wgpu::float_cat(lengths.iter().zip(there).map(part).collect(), 0)
+    Floats::<R>::float_cat(lengths.iter().zip(there).map(part).collect(), 0)
 }

@@ -1,17 +1,19 @@
-//! The fused ops on the GPU: `CubeCL` kernels over the tensors of the wgpu backend, in f32.
+//! The fused ops on the GPU: `CubeCL` kernels over the tensors of the backends wgpu and CUDA, in f32.
 //!
 //! They compute the sums of `softrast-kernel` face by face. A few units share a face and add its terms to the pixels of its bounding box as
 //! integers, by atomic operations whose order does not matter. So no kernel needs the faces of a pixel, and nothing is culled, sorted or
 //! read back. Vertex gradients are gathered, first per face over its pixels, then per vertex over its faces. Cameras and losses are kernels
 //! too, so a step launches fewer than twenty. Results are deterministic. The second order uses the same kernels over dual numbers.
 
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 mod adapter;
 mod backend;
 mod blend;
 mod blend_inputs;
 mod blend_pass;
 mod camera;
+#[cfg(feature = "cuda")]
+mod cuda;
 mod depth;
 mod dual;
 mod elementary;
@@ -19,6 +21,7 @@ mod face_attributes;
 mod flat;
 mod frame;
 mod gradient;
+mod kept;
 mod losses;
 mod of_pixel;
 mod pair;
@@ -34,23 +37,33 @@ mod texture;
 mod topology;
 mod whole;
 
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 pub use adapter::adapter_name;
+#[cfg(feature = "cuda")]
+pub use backend::Cuda;
+#[cfg(feature = "wgpu")]
 pub use backend::Wgpu;
+#[cfg(feature = "cuda")]
+pub use cuda::cuda_device_name;
 pub(crate) use prepared::SumOnGpu;
 pub(crate) use topology::Topology;
 
-use softrast_tensor::{FloatTensor, FloatTensorOps, TensorMetadata};
+use softrast_tensor::{
+    FloatTensorOps, TensorMetadata,
+    gpu::{BoolElement, CubeBackend, CubeRuntime},
+};
 
 use crate::{FusedOp, Pass, RasterBackend, SoftBlend};
+use backend::Floats;
 use blend_pass::{Blend, as_sum};
 use flat::{length, parts, whole_direction};
 use pass::Pass as Kernels;
+use prepared::Buffer;
 
-impl RasterBackend for Wgpu {
+impl<R: CubeRuntime, BT: BoolElement> RasterBackend for CubeBackend<R, f32, i32, BT> {
     const ON_HOST: bool = false;
 
-    fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
+    fn run(op: &FusedOp, pass: &Pass, tensors: Vec<Buffer<R>>) -> Buffer<R> {
         let op = match op {
             FusedOp::ProfileSum(op) => op,
             FusedOp::SoftBlend(op) => return blended(op, pass, tensors),
@@ -86,7 +99,7 @@ impl RasterBackend for Wgpu {
 }
 
 /// A pass of the colour op.
-fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> FloatTensor<Wgpu> {
+fn blended<R: CubeRuntime>(op: &SoftBlend, pass: &Pass, tensors: Vec<Buffer<R>>) -> Buffer<R> {
     let count = 4 + usize::from(op.texture.is_some());
     let mut inputs = tensors;
     let mut rest = inputs.split_off(count).into_iter();
@@ -97,7 +110,7 @@ fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> Floa
     let (direction, wanted, upstream) = match pass {
         Pass::Forward => {
             let image = Blend::new(op, &sum, inputs, None).image();
-            return Wgpu::float_reshape(image, shape.into());
+            return Floats::<R>::float_reshape(image, shape.into());
         }
         Pass::Vjp { wanted } => (None, wanted, next()),
         Pass::VjpOfVjp { along, wanted } => {
@@ -115,5 +128,5 @@ fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> Floa
     }
     parts.push(Some(found.image));
     let parts = parts.into_iter().zip(wanted).filter(|&(_, &wanted)| wanted);
-    Wgpu::float_cat(parts.filter_map(|(part, _)| part).collect(), 0)
+    Floats::<R>::float_cat(parts.filter_map(|(part, _)| part).collect(), 0)
 }

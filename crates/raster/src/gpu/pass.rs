@@ -3,8 +3,8 @@
 use softrast_kernel::Grid;
 use softrast_tensor::{
     DType, TensorMetadata,
-    wgpu::{
-        CubeTensor, WgpuRuntime,
+    gpu::{
+        CubeRuntime, CubeTensor,
         cubecl::{calculate_cube_count_elemwise, prelude::*},
         into_contiguous, zeros_client,
     },
@@ -13,17 +13,18 @@ use softrast_tensor::{
 use super::{
     frame::FrameLaunch,
     gradient::{UNITS, gather_corners, sum_faces},
+    kept::Kept,
     pair::LookupLaunch,
     parts::{self, SLOTS},
     prepare::{PREPARED, prepare},
-    prepared::{Buffer, Kept, Prepared},
+    prepared::{Buffer, Prepared},
     splat::{CLEARED, Terms, clear, settle, splat},
     table::{self, sum_cubics, sum_tables},
     topology::OnDevice,
     whole::zero,
 };
 
-use crate::{ImageSize, ProfileSum, SoftBlend, weighting::FARTHEST_SEEN};
+use crate::{ImageSize, ProfileSum, weighting::FARTHEST_SEEN};
 
 /// Largest buffer that a pass allocates, in bytes: half of the size that every adapter can bind (128 MiB).
 const BUFFER: usize = 64 << 20;
@@ -39,16 +40,16 @@ const TABLES: usize = 32 << 20;
 pub(super) const CUBE: u32 = 64;
 
 /// Inputs of a pass on the device.
-pub(super) struct Pass<'a> {
+pub(super) struct Pass<'a, R: CubeRuntime> {
     pub(super) op: &'a ProfileSum,
-    pub(super) client: ComputeClient<WgpuRuntime>,
+    pub(super) client: ComputeClient<R>,
     /// `[views, 3, vertices]`.
-    pub(super) vertices: Buffer,
+    pub(super) vertices: Buffer<R>,
     /// `[rows, 4]`.
-    table: Buffer,
+    table: Buffer<R>,
     /// Derivatives of vertices and table, concatenated, in a pass of second order.
-    direction: Option<Buffer>,
-    pub(super) topology: OnDevice,
+    direction: Option<Buffer<R>>,
+    pub(super) topology: OnDevice<R>,
     pub(super) views: usize,
     pub(super) vertex_count: usize,
     /// Whether prepared faces include depths.
@@ -62,30 +63,30 @@ pub(super) struct Pass<'a> {
 }
 
 /// Accumulators of the sums of pixels.
-struct Splatted {
+struct Splatted<R: CubeRuntime> {
     /// Two words per pixel.
-    words: Buffer,
+    words: Buffer<R>,
     /// One scale for all pixels, or one per pixel.
-    scale: Buffer,
+    scale: Buffer<R>,
     terms: Terms,
 }
 
 /// Partial tables of the units that sum the gradient of a table.
-pub(super) struct Partial {
+pub(super) struct Partial<R: CubeRuntime> {
     pub(super) cubes: usize,
     units: usize,
     /// Numbers per table.
     coefficients: usize,
     /// `[units, rows, 4]`.
-    pub(super) tables: Buffer,
+    pub(super) tables: Buffer<R>,
 }
 
-impl<'a> Pass<'a> {
+impl<'a, R: CubeRuntime> Pass<'a, R> {
     pub(super) fn new(
         op: &'a ProfileSum,
-        vertices: Buffer,
-        table: Buffer,
-        direction: Option<Buffer>,
+        vertices: Buffer<R>,
+        table: Buffer<R>,
+        direction: Option<Buffer<R>>,
     ) -> Self {
         assert_eq!(vertices.dtype(), DType::F32, "profile_sum on the GPU works in f32");
         let (client, device) = (vertices.client.clone(), vertices.device.clone());
@@ -115,14 +116,15 @@ impl<'a> Pass<'a> {
     }
 
     /// Sums of the profile, flat: `[views * height * width]`.
-    pub(super) fn sums(&self) -> Buffer {
+    pub(super) fn sums(&self) -> Buffer<R> {
         let sums = self.buffer(self.pixels(), DType::F32);
         for [first, views] in self.parts() {
             let slots = self.buffer(parts::words(views, views * self.op.faces.len()), DType::U32);
             let splatted = self.cleared(views, Some(&slots));
             let faces = self.prepare(first, views, slots);
             if let Some(kept) = self.kept() {
-                kept.set(faces.clone());
+                // Another call may have set it first, with the same faces.
+                kept.get_or_set(|| faces.clone());
             }
             self.splat(&faces, splatted, &sums, 0);
         }
@@ -130,7 +132,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Gradient of `Σ upstream · sums` with respect to the vertices only, flat.
-    pub(super) fn to_vertices(&self, upstream: Buffer) -> Buffer {
+    pub(super) fn to_vertices(&self, upstream: Buffer<R>) -> Buffer<R> {
         let upstream = into_contiguous(upstream);
         let gradient = self.buffer(3 * self.views * self.vertex_count, DType::F32);
         for faces in self.prepared() {
@@ -141,7 +143,7 @@ impl<'a> Pass<'a> {
 
     /// Gradient of `Σ upstream · sums` with respect to vertices and table, flat. In a pass of second order its derivative, followed by that
     /// of the sums.
-    pub(super) fn gradient(&self, upstream: Buffer) -> Buffer {
+    pub(super) fn gradient(&self, upstream: Buffer<R>) -> Buffer<R> {
         let upstream = into_contiguous(upstream);
         let coordinates = 3 * self.views * self.vertex_count;
         let coefficients = 4 * self.rows();
@@ -161,7 +163,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Tables of `rows` rows for units that walk over parts of faces.
-    pub(super) fn partial(&self, rows: usize) -> Partial {
+    pub(super) fn partial(&self, rows: usize) -> Partial<R> {
         let (cube, coefficients) = (table::UNITS as usize, 4 * rows);
         let cubes = (TABLES / (4 * coefficients * cube)).clamp(1, 4096);
         let units = cubes * cube;
@@ -170,7 +172,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Sums the tables of all units into `gradient`, from `offset` on.
-    pub(super) fn add_up(&self, partial: Partial, gradient: &Buffer, offset: usize) {
+    pub(super) fn add_up(&self, partial: Partial<R>, gradient: &Buffer<R>, offset: usize) {
         let Partial { units, coefficients, tables, .. } = partial;
         sum_tables::launch(
             &self.client,
@@ -185,10 +187,10 @@ impl<'a> Pass<'a> {
     }
 
     /// The faces of the views, prepared in batches of views whose buffers fit.
-    pub(super) fn prepared(&self) -> impl Iterator<Item = Prepared> {
+    pub(super) fn prepared(&self) -> impl Iterator<Item = Prepared<R>> {
         let faces = self.op.faces.len();
         self.parts().map(move |[first, views]| {
-            if let Some(kept) = self.kept().and_then(Kept::get) {
+            if let Some(kept) = self.kept().and_then(Kept::get::<Prepared<R>>) {
                 return kept.clone();
             }
             let slots = self.zeros(parts::words(views, views * faces), DType::U32);
@@ -213,7 +215,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Prepares the faces of some views. The first words of `slots` are 0.
-    fn prepare(&self, first_view: usize, views: usize, slots: Buffer) -> Prepared {
+    fn prepare(&self, first_view: usize, views: usize, slots: Buffer<R>) -> Prepared<R> {
         let faces = self.op.faces.len();
         assert!(faces <= MOST_FACES, "a GPU draws at most {MOST_FACES} faces, found {faces}");
         let jobs = views * faces;
@@ -245,7 +247,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Zeroed sums for the pixels of some views and zeros in the first words of `slots`; how terms are added, and their scale.
-    fn cleared(&self, views: usize, slots: Option<&Buffer>) -> Splatted {
+    fn cleared(&self, views: usize, slots: Option<&Buffer<R>>) -> Splatted<R> {
         let pixels = views * self.op.size.pixels();
         let words = self.buffer(2 * pixels, DType::U32);
         let header = if slots.is_some() { 1 + views } else { 0 };
@@ -273,7 +275,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Writes zeros to the first words of three buffers.
-    pub(super) fn zero(&self, buffers: [(&Buffer, usize); 3]) {
+    pub(super) fn zero(&self, buffers: [(&Buffer<R>, usize); 3]) {
         let [(a, of_a), (b, of_b), (c, of_c)] = buffers;
         zero::launch(
             &self.client,
@@ -289,7 +291,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Writes the sums of some views to `out`, where all views start at `offset`; in a pass of second order their derivatives.
-    fn splat(&self, faces: &Prepared, splatted: Splatted, out: &Buffer, offset: usize) {
+    fn splat(&self, faces: &Prepared<R>, splatted: Splatted<R>, out: &Buffer<R>, offset: usize) {
         let Prepared { first_view, views, corners, reaches, slots } = faces;
         let Splatted { words, scale, terms } = splatted;
         let (face_count, lanes) = (self.op.faces.len(), self.lanes());
@@ -347,7 +349,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Writes the gradient with respect to the vertices of the views to the start of `out`.
-    fn write_corners(&self, prepared: &Prepared, upstream: &Buffer, out: &Buffer) {
+    fn write_corners(&self, prepared: &Prepared<R>, upstream: &Buffer<R>, out: &Buffer<R>) {
         let Prepared { first_view, views, corners, reaches, slots } = prepared;
         let (faces, lanes) = (self.op.faces.len(), self.lanes());
         let groups = views * faces + SLOTS as usize;
@@ -380,10 +382,10 @@ impl<'a> Pass<'a> {
     /// Sums the corners of each vertex or entry: `count` numbers from `first` on in the `stride` of a face become the first of its `rows`.
     pub(super) fn gather(
         &self,
-        prepared: &Prepared,
-        of_faces: &Buffer,
-        (corners, vertices): (&Buffer, usize),
-        gradient: &Buffer,
+        prepared: &Prepared<R>,
+        of_faces: &Buffer<R>,
+        (corners, vertices): (&Buffer<R>, usize),
+        gradient: &Buffer<R>,
         [stride, first, count, rows]: [usize; 4],
         by_vertex: bool,
     ) {
@@ -409,7 +411,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Adds the gradient of the table for some views to `partial`.
-    fn add_cubics(&self, faces: &Prepared, upstream: &Buffer, partial: &Partial) {
+    fn add_cubics(&self, faces: &Prepared<R>, upstream: &Buffer<R>, partial: &Partial<R>) {
         sum_cubics::launch(
             &self.client,
             CubeCount::Static(partial.cubes as u32, 1, 1),
@@ -429,7 +431,7 @@ impl<'a> Pass<'a> {
     }
 
     /// The table buffer; for colours, the buffer of all shared numbers.
-    pub(super) fn table(&self) -> &Buffer {
+    pub(super) fn table(&self) -> &Buffer<R> {
         &self.table
     }
 
@@ -438,7 +440,7 @@ impl<'a> Pass<'a> {
     }
 
     /// The direction; without one any buffer, since it is not read.
-    pub(super) fn direction(&self) -> Buffer {
+    pub(super) fn direction(&self) -> Buffer<R> {
         self.direction.as_ref().unwrap_or(&self.table).clone()
     }
 
@@ -461,12 +463,12 @@ impl<'a> Pass<'a> {
         self.op.grid.rows()
     }
 
-    pub(super) fn frame(&self) -> FrameLaunch<WgpuRuntime> {
+    pub(super) fn frame(&self) -> FrameLaunch<R> {
         let ImageSize { height, width } = self.op.size;
         FrameLaunch::new(height as u32, width as u32, height.min(width) as u32)
     }
 
-    fn lookup(&self) -> LookupLaunch<WgpuRuntime> {
+    fn lookup(&self) -> LookupLaunch<R> {
         lookup(&self.op.grid)
     }
 
@@ -475,20 +477,20 @@ impl<'a> Pass<'a> {
     }
 
     /// An uninitialised flat buffer.
-    pub(super) fn buffer(&self, length: usize, dtype: DType) -> Buffer {
+    pub(super) fn buffer(&self, length: usize, dtype: DType) -> Buffer<R> {
         let handle = self.client.empty(length * dtype.size());
         let device = self.vertices.device.clone();
         CubeTensor::new_contiguous(self.client.clone(), device, [length].into(), handle, dtype)
     }
 
-    pub(super) fn zeros(&self, length: usize, dtype: DType) -> Buffer {
+    pub(super) fn zeros(&self, length: usize, dtype: DType) -> Buffer<R> {
         let device = self.vertices.device.clone();
         zeros_client(self.client.clone(), device, [length].into(), dtype)
     }
 }
 
 /// A grid prepared for look-ups.
-pub(super) fn lookup(grid: &Grid) -> LookupLaunch<WgpuRuntime> {
+pub(super) fn lookup<R: CubeRuntime>(grid: &Grid) -> LookupLaunch<R> {
     let [start, end] = [grid.octaves, grid.far + 1].map(|k| f64::exp2(-f64::from(k)));
     let [outer, inner] = grid.lookups(1.0).map(|side| side.map(|number| number as f32));
     LookupLaunch::new(

@@ -1,19 +1,15 @@
-use std::{
-    fmt,
-    sync::{Arc, OnceLock},
-};
+use softrast_tensor::gpu::{CubeRuntime, CubeTensor};
 
-use softrast_tensor::wgpu::{CubeTensor, WgpuRuntime};
+use super::{kept::Kept, topology::Topology};
 
-use super::topology::Topology;
-
-pub(super) type Buffer = CubeTensor<WgpuRuntime>;
+pub(super) type Buffer<R> = CubeTensor<R>;
 
 /// GPU state of an op of sums, in addition to its inputs.
 #[derive(Clone, Debug)]
 pub(crate) struct SumOnGpu {
     pub(super) topology: Topology,
-    /// Cached faces, for a recorded op.
+    /// Cache between the forward pass and the backward passes of a recorded op: the faces of all views, [`Prepared`], if their buffers fit.
+    /// 44 bytes per face.
     pub(super) kept: Option<Kept>,
     /// Whether terms are like optical depths: no significant term is lost next to the largest in a sum of integers.
     pub(super) like_depths: bool,
@@ -30,34 +26,13 @@ impl SumOnGpu {
     }
 }
 
-/// Cache between the forward pass and the backward passes: the faces of all views, if their buffers fit. 44 bytes per face.
-#[derive(Clone, Default)]
-pub(super) struct Kept(Arc<OnceLock<Prepared>>);
-
-impl fmt::Debug for Kept {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_tuple("Kept").field(&self.0.get().is_some()).finish()
-    }
-}
-
-impl Kept {
-    pub(super) fn get(&self) -> Option<&Prepared> {
-        self.0.get()
-    }
-
-    pub(super) fn set(&self, faces: Prepared) {
-        // Another call may have set it first, with the same faces.
-        let _ = self.0.set(faces);
-    }
-}
-
 /// The faces of some of the views.
 #[derive(Clone)]
-pub(super) struct Prepared {
+pub(super) struct Prepared<R: CubeRuntime> {
     pub(super) first_view: usize,
     pub(super) views: usize,
-    pub(super) corners: Buffer,
-    pub(super) reaches: Buffer,
+    pub(super) corners: Buffer<R>,
+    pub(super) reaches: Buffer<R>,
     /// The split of faces, and the number drawn; see [`parts`](super::parts).
-    pub(super) slots: Buffer,
+    pub(super) slots: Buffer<R>,
 }

@@ -1,50 +1,47 @@
-use std::sync::{Arc, OnceLock};
+use softrast_tensor::gpu::{CubeRuntime, CubeTensor, cubecl::prelude::*};
 
-use softrast_tensor::wgpu::{CubeTensor, WgpuDevice, WgpuRuntime, cubecl::prelude::*};
+use super::kept::Kept;
 
 /// The faces of an op on a device: uploaded by its first pass there, cached for later ones.
-#[derive(Clone, Default)]
-pub(crate) struct Topology(Arc<OnceLock<(WgpuDevice, OnDevice)>>);
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Topology(Kept);
 
 /// Vertices of faces, and faces of vertices.
 #[derive(Clone)]
-pub(super) struct OnDevice {
+pub(super) struct OnDevice<R: CubeRuntime> {
     /// `[faces, 3]`: the vertices of each face.
-    pub(super) faces: CubeTensor<WgpuRuntime>,
+    pub(super) faces: CubeTensor<R>,
     /// `[vertices + 1 + 3 faces]`: the offset of each vertex's first corner, then the corners, each as `3 * face + corner`, in ascending
     /// order.
-    pub(super) corners: CubeTensor<WgpuRuntime>,
+    pub(super) corners: CubeTensor<R>,
     vertex_count: usize,
-}
-
-impl std::fmt::Debug for Topology {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.debug_tuple("Topology").field(&self.0.get().map(|(device, _)| device)).finish()
-    }
 }
 
 impl Topology {
     /// The faces over `vertex_count` vertices on the device of `client`.
-    pub(super) fn on(
+    pub(super) fn on<R: CubeRuntime>(
         &self,
         faces: &[[u32; 3]],
         vertex_count: usize,
-        client: &ComputeClient<WgpuRuntime>,
-        device: &WgpuDevice,
-    ) -> OnDevice {
+        client: &ComputeClient<R>,
+        device: &R::Device,
+    ) -> OnDevice<R> {
         let upload = || OnDevice::new(faces, vertex_count, client, device);
-        let (kept_on, kept) = self.0.get_or_init(|| (device.clone(), upload()));
-        let fits = kept_on == device && kept.vertex_count == vertex_count;
-        if fits { kept.clone() } else { upload() }
+        match self.0.get_or_set(|| (device.clone(), upload())) {
+            Some((kept_on, kept)) if kept_on == device && kept.vertex_count == vertex_count => {
+                kept.clone()
+            }
+            _ => upload(),
+        }
     }
 }
 
-impl OnDevice {
+impl<R: CubeRuntime> OnDevice<R> {
     fn new(
         faces: &[[u32; 3]],
         vertex_count: usize,
-        client: &ComputeClient<WgpuRuntime>,
-        device: &WgpuDevice,
+        client: &ComputeClient<R>,
+        device: &R::Device,
     ) -> Self {
         let tensor = |values: &[u32]| {
             CubeTensor::new_contiguous(

@@ -30,7 +30,7 @@ pub struct SoftBlend {
     /// Cache between the forward pass and the backward passes of a recorded op: the faces of each row, 28 bytes per face and view, and the
     /// sums of each pixel: channels and share rounded up to fours, and one number more. Its type is that of the floats.
     pub(crate) kept: Option<Arc<OnceLock<Box<dyn Any + Send + Sync>>>>,
-    #[cfg(feature = "wgpu")]
+    #[cfg(feature = "gpu")]
     pub(crate) topology: crate::gpu::Topology,
 }
 

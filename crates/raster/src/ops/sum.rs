@@ -18,7 +18,7 @@ pub struct ProfileSum {
     pub(crate) culls: bool,
     /// Cache between the forward pass and the backward passes of a recorded op: the faces of each row, 20 bytes per face and view.
     pub(crate) kept: Option<Arc<OnceLock<Bands>>>,
-    #[cfg(feature = "wgpu")]
+    #[cfg(feature = "gpu")]
     pub(crate) on_gpu: crate::gpu::SumOnGpu,
 }
 
@@ -27,7 +27,7 @@ impl ProfileSum {
     pub(crate) fn keeping(&self) -> Self {
         Self {
             kept: Some(self.kept.clone().unwrap_or_default()),
-            #[cfg(feature = "wgpu")]
+            #[cfg(feature = "gpu")]
             on_gpu: self.on_gpu.keeping(),
             ..self.clone()
         }

@@ -99,7 +99,10 @@ fn nothing_is_overwritten_and_every_refusal_says_why() {
     );
     refuse(train(&out, "--epochs 2 --resume --seed 9"), &["seed is 0 there, 9 here"]);
     refuse(train(&out, "--softness soft"), &["unknown softness", "logistic"]);
-    refuse(train(&out, "--backend cuda"), &["no backend", "expected ndarray, flex or wgpu"]);
+    refuse(
+        train(&out, "--backend opencl"),
+        &["no backend", "expected ndarray, flex, wgpu or cuda"],
+    );
     refuse(train(&out, "--t-conorm soft"), &["unknown T-conorm"]);
     refuse(train(&out, "--data /no/such/folder"), &["--data", "--shapes"]);
     let evaluate = || run(&format!("evaluate --checkpoint {} --shapes 1", path.display()));

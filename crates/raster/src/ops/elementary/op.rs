@@ -29,7 +29,7 @@ pub enum ElementaryOp {
 }
 
 impl ElementaryOp {
-    #[cfg(feature = "wgpu")]
+    #[cfg(feature = "gpu")]
     pub(crate) fn is_iou(self) -> bool {
         matches!(self, Self::Iou)
     }
