@@ -4,6 +4,7 @@
 //! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu              # a table
 //! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu -- --json    # and a line of JSON
 //! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu -- W1        # those with W1 in their names
+//! cargo bench -p softrast-raster --no-default-features --features cuda --bench gpu              # through CUDA
 //! ```
 //!
 //! A step is an iteration of an optimisation except its update: projection, image, mean squared difference to a disk (of colours to black),
@@ -16,10 +17,11 @@ mod workload;
 use std::time::{Duration, Instant};
 
 use machine::machine;
-use softrast_mesh::icosphere;
-use softrast_raster::{
-    Attributes, ColourRenderer, RasterBackend, SoftRenderer, Wgpu, adapter_name, mse_loss, project,
-};
+use softrast_raster::{Attributes, ColourRenderer, RasterBackend, SoftRenderer, mse_loss, project};
+#[cfg(feature = "cuda")]
+use softrast_raster::{Cuda as Gpu, cuda_device_name as device_name};
+#[cfg(not(feature = "cuda"))]
+use softrast_raster::{Wgpu as Gpu, adapter_name as device_name};
 use softrast_softness::Family;
 use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 use workload::{SOFTNESS, Workload, disk, tensor};
@@ -33,7 +35,7 @@ const MEASUREMENT: Duration = Duration::from_millis(1500);
 const BATCH: Duration = Duration::from_millis(50);
 
 fn main() {
-    match adapter_name() {
+    match device_name() {
         Ok(name) => println!("GPU: {name}; CPU: {}", machine()),
         Err(none) => {
             println!("skipped: {none}");
@@ -48,12 +50,12 @@ fn main() {
     println!("{:<56} {:>10} {:>10}", "a step, ms (median)", "GPU", "CPU");
     let mut rows = Vec::new();
     for workload in silhouettes.iter().filter(|workload| wanted(workload)) {
-        let gpu = median(|| silhouette::<Wgpu>(workload));
+        let gpu = median(|| silhouette::<Gpu>(workload));
         let cpu = median(|| silhouette::<NdArray<f32>>(workload));
         rows.push(shown(&workload.name, [gpu, cpu]));
     }
     if wanted(&colours) {
-        let gpu = median(|| coloured::<Wgpu>(&colours));
+        let gpu = median(|| coloured::<Gpu>(&colours));
         let cpu = median(|| coloured::<NdArray<f32>>(&colours));
         rows.push(shown(&colours.name, [gpu, cpu]));
     }

@@ -4,16 +4,16 @@ use std::sync::Arc;
 
 use softrast_mesh::icosphere;
 use softrast_raster::{
-    Attributes, Background, ColourRenderer, Projected, RasterBackend, Weighting, Wgpu, project,
+    Attributes, Background, ColourRenderer, Projected, RasterBackend, Weighting, project,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 
-use crate::{
+use super::{
     adapter,
     products::{numbers, relative, tensor},
-    triangles::triangles,
 };
+use crate::{Gpu, triangles::triangles};
 
 /// Largest error of a pixel, and of derivatives relative to their length: larger if tables are computed in f32.
 const IMAGE: f64 = 1e-4;
@@ -121,7 +121,7 @@ fn products<T: RasterBackend>(scene: &Scene, wanted: Wanted, dtype: DType) -> Ve
 
 fn assert_close(scene: &Scene, wanted: Wanted, name: &str) {
     let expected = products::<NdArray<f64>>(scene, wanted, DType::F64);
-    let found = products::<Wgpu>(scene, wanted, DType::F32);
+    let found = products::<Gpu>(scene, wanted, DType::F32);
     let image = found[0].iter().zip(&expected[0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let errors: Vec<f64> =
         found[1..].iter().zip(&expected[1..]).map(|(a, b)| relative(a, b)).collect();
@@ -256,7 +256,7 @@ fn gradients_of_large_faces_that_share_edges_agree_with_the_kernel_in_f64() {
     // CPU has errors there too.
     let scene = ball_of(0, [150, 140], Family::Logistic, DepthSoftness::Family(Family::Exp));
     let expected = products::<NdArray<f64>>(&scene, Wanted::Scene, DType::F64);
-    let found = products::<Wgpu>(&scene, Wanted::Scene, DType::F32);
+    let found = products::<Gpu>(&scene, Wanted::Scene, DType::F32);
     let errors: Vec<f64> = (1..4).map(|k| relative(&found[k], &expected[k])).collect();
     println!("{errors:?}");
     assert!(errors.iter().all(|&error| error <= 2e-4), "relative errors {errors:?}");
@@ -292,7 +292,7 @@ fn colours_textures_and_softnesses_get_the_same_gradients_every_time() {
     let textured = Scene { texture: Some([2, 2]), ..ball(Family::Logistic, exp) };
     let cut = large();
     for (scene, wanted) in [(&textured, Wanted::Scene), (&cut, Wanted::Softness)] {
-        let [first, second] = [(); 2].map(|()| products::<Wgpu>(scene, wanted, DType::F32));
+        let [first, second] = [(); 2].map(|()| products::<Gpu>(scene, wanted, DType::F32));
         assert_eq!(first, second);
     }
 }
@@ -311,10 +311,10 @@ fn views_that_no_launch_takes_together_are_drawn_in_parts() {
     let renderer = ColourRenderer::new(&[[0, 1, 2]], 1, Family::Logistic, 0.1, [1.0, 3.0]);
     let image = |first: usize, count: usize| -> Vec<f64> {
         let part: Vec<f64> = (first..first + count).flat_map(triangle).flatten().collect();
-        let colours = tensor::<Wgpu, 3>(&[0.2, 0.5, 0.9], [1, 3, 1], DType::F32);
+        let colours = tensor::<Gpu, 3>(&[0.2, 0.5, 0.9], [1, 3, 1], DType::F32);
         let attributes = Attributes::of_vertices(colours, &[[0, 1, 2]]);
         let background = renderer.background(&[0.0], &Default::default());
-        let vertices = tensor::<Wgpu, 3>(&part, [count, 3, 3], DType::F32);
+        let vertices = tensor::<Gpu, 3>(&part, [count, 3, 3], DType::F32);
         numbers(renderer.image(Projected::new(vertices), &attributes, &background))
     };
     assert_eq!(image(0, views)[2 * 65_520..], image(65_520, 20));
@@ -327,7 +327,7 @@ fn an_upstream_that_is_no_number_gives_a_texture_none() {
     }
     let exp = DepthSoftness::Family(Family::Exp);
     let scene = ball(Family::Logistic, exp);
-    let tensor = |values: &[f64], shape| tensor::<Autodiff<Wgpu>, 3>(values, shape, DType::F32);
+    let tensor = |values: &[f64], shape| tensor::<Autodiff<Gpu>, 3>(values, shape, DType::F32);
     let texture = tensor(&[0.5; 12], [2, 2, 3]).require_grad();
     let places: Vec<f64> = (0..2 * scene.entries.1).map(|k| 0.07 * k as f64).collect();
     let attributes = Attributes::new(tensor(&places, [1, scene.entries.1, 2]), scene.entries.0)

@@ -1,12 +1,13 @@
 //! Cameras and losses on the GPU in f32 against f64 on the CPU: values, gradients, second order.
 
-use softrast_raster::{RasterBackend, TConorm, Wgpu, iou_loss, mse_loss, project};
+use softrast_raster::{RasterBackend, TConorm, iou_loss, mse_loss, project};
 use softrast_tensor::{Autodiff, NdArray, Tensor, vector};
 
-use crate::{
+use super::{
     adapter,
     products::{numbers, relative},
 };
+use crate::Gpu;
 
 /// Largest error of values and derivatives, relative to their length.
 const BOUND: f64 = 2e-5;
@@ -95,7 +96,7 @@ fn cameras_at_the_poles_are_turned_as_on_the_cpu() {
     }
     let elevations = [90.0, -90.0, 270.0, 450.0, 91.0, -91.0, 89.0, 269.0];
     let (exact, cpu) = (seen::<NdArray<f64>>(&elevations), seen::<NdArray<f32>>(&elevations));
-    for (k, (a, b)) in seen::<Wgpu>(&elevations).iter().zip(exact.iter().zip(cpu)).enumerate() {
+    for (k, (a, b)) in seen::<Gpu>(&elevations).iter().zip(exact.iter().zip(cpu)).enumerate() {
         let near = |x: f64| (a - x).abs() < 1e-5;
         assert!(near(*b.0) && near(b.1), "{}: {a}, {b:?}", elevations[k / 3]);
     }
@@ -110,7 +111,7 @@ fn cameras_and_losses_agree_with_the_cpu_in_f64_to_second_order() {
     let losses = [Of::Iou(2, 2), Of::Iou(2, 1), Of::Mse(2, 2), Of::Mse(1, 2)];
     for of in projections.into_iter().chain(losses).chain([Of::Coverage]) {
         let expected = of.orders::<NdArray<f64>>();
-        let found = of.orders::<Wgpu>();
+        let found = of.orders::<Gpu>();
         let errors: Vec<f64> = found
             .iter()
             .zip(&expected)

@@ -11,22 +11,23 @@ mod paper_mesh;
 mod workload;
 
 use known_row::KnownRow;
-use softrast_raster::{Wgpu, low_level::Rasterizer};
+use softrast_raster::low_level::Rasterizer;
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{DType, NdArray};
 use workload::Workload;
 
-use crate::{
+use super::{
     adapter,
     products::{Path, Products},
     seen,
 };
+use crate::Gpu;
 
 /// Bounds for loss, mean coverage and gradient norm.
 const BOUNDS: [f64; 3] = [1e-5, 1e-5, 1e-4];
 
 fn assert_exact(KnownRow { name, workload, row }: &KnownRow) {
-    workload.by_fused_op::<Wgpu>(Rasterizer::TOLERANCE).assert_agrees(name, row, BOUNDS);
+    workload.by_fused_op::<Gpu>(Rasterizer::TOLERANCE).assert_agrees(name, row, BOUNDS);
 }
 
 fn assert_agrees_with_the_kernel(KnownRow { name, workload, .. }: KnownRow) {
@@ -34,7 +35,7 @@ fn assert_agrees_with_the_kernel(KnownRow { name, workload, .. }: KnownRow) {
     let softness = EdgeSoftness::squared(Family::Logistic);
     let scene = seen(&mesh, (0.0, &azimuths_deg), size, softness, 1e-4);
     let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Table);
-    let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Table);
+    let found = Products::new::<Gpu>(&scene, DType::F32, Path::Table);
     found.assert_close(&expected, name);
 }
 

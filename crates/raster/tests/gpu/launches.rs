@@ -3,11 +3,12 @@
 use std::{fs, process::Command, thread, time::Duration};
 
 use softrast_mesh::icosphere;
-use softrast_raster::{Orbit, RasterBackend, SoftRenderer, Wgpu, project, vertices};
+use softrast_raster::{Orbit, RasterBackend, SoftRenderer, project, vertices};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{Autodiff, Tensor};
 
-use crate::adapter;
+use super::adapter;
+use crate::Gpu;
 
 /// Environment variable of the log in the process that runs the steps.
 const LOG: &str = "CUBECL_DEBUG_LOG";
@@ -48,7 +49,7 @@ fn take_steps(pose: bool, size: usize) {
     let renderer = SoftRenderer::new(icosphere(2).faces(), size, softness, 1e-3);
     let target = Tensor::zeros([3, size, size], &Default::default());
     for _ in 0..STEPS {
-        step::<Wgpu>(&renderer, target.clone(), pose);
+        step::<Gpu>(&renderer, target.clone(), pose);
     }
     // CubeCL writes its log in the background, and incompletely if the process ends.
     let begun = || fs::read_to_string(&log).map_or(0, |text| text.matches(FIRST).count());
@@ -83,7 +84,7 @@ fn steps_of_a_pose() {
 fn launched(name: &str) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("log");
-    let test = format!("launches::{name}");
+    let test = format!("gpu::launches::{name}");
     let run = Command::new(std::env::current_exe().expect("this test"))
         .args(["--exact", &test, "--ignored", "--nocapture"])
         .env(LOG, &log)

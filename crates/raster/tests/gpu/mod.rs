@@ -1,32 +1,28 @@
 //! The fused op on the GPU in f32 against f64 on the CPU: image, gradient, second order.
-//!
-//! Runs on any adapter that wgpu finds, including Mesa's software Vulkan, and prints `skipped` if there is none.
 
 mod colours;
 mod launches;
 mod products;
 mod small_ops;
-#[path = "../triangles/mod.rs"]
-mod triangles;
 mod workloads;
 
 use std::sync::Arc;
 
 use products::{Path, Products, Scene, tensor};
 use softrast_mesh::{Mesh, fox, icosphere};
-use softrast_raster::{
-    ImageSize, RasterBackend, TConorm, Wgpu, adapter_name, low_level::Rasterizer, project,
-};
+use softrast_raster::{ImageSize, RasterBackend, TConorm, low_level::Rasterizer, project};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{DType, NdArray, Tensor};
 
-/// Prints the adapter that the test runs on, or `skipped`.
+use crate::{Gpu, device_name, triangles};
+
+/// Prints the adapter or card that the test runs on, or `skipped`.
 fn adapter() -> bool {
-    match adapter_name() {
+    match device_name() {
         Ok(name) => println!("on {name}"),
         Err(none) => println!("skipped: {none}"),
     }
-    adapter_name().is_ok()
+    device_name().is_ok()
 }
 
 /// A mesh from a distance of 2.732, for an elevation and some azimuths in degrees.
@@ -76,8 +72,8 @@ fn a_straight_edge_is_the_softness_itself() {
     let corners = [0.0, -50.0, 2.0, 0.0, 50.0, 2.0, -50.0, 0.0, 2.0];
     let faces: Arc<[[u32; 3]]> = [[0, 1, 2]].into();
     let softness = EdgeSoftness::new(Family::Logistic);
-    let phi = tensor::<Wgpu, 1>(&softness.default_phi(0.2), [1], DType::F32);
-    let vertices = tensor::<Wgpu, 3>(&corners, [1, 3, 3], DType::F32);
+    let phi = tensor::<Gpu, 1>(&softness.default_phi(0.2), [1], DType::F32);
+    let vertices = tensor::<Gpu, 3>(&corners, [1, 3, 3], DType::F32);
     let silhouette = Rasterizer::new(8).prepare(&faces, softness, &phi);
     let image: Vec<f64> = silhouette.coverage(vertices, phi).into_data().iter().collect();
     for (pixel, found) in image.into_iter().enumerate() {
@@ -95,7 +91,7 @@ fn random_triangles_agree_with_the_reference() {
     for family in [Family::Logistic, Family::Exp] {
         let scene = random(EdgeSoftness::new(family), 0.05);
         let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Reference);
-        let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+        let found = Products::new::<Gpu>(&scene, DType::F32, Path::Fused);
         found.assert_close(&expected, &family.to_string());
     }
 }
@@ -126,7 +122,7 @@ fn scenes_agree_with_the_kernel_in_f64_to_second_order() {
     ];
     for (name, scene) in scenes {
         let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Table);
-        let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Table);
+        let found = Products::new::<Gpu>(&scene, DType::F32, Path::Table);
         found.assert_close(&expected, name);
     }
 }
@@ -146,9 +142,9 @@ fn more_views_than_a_launch_takes_are_drawn_in_parts() {
     let faces: Arc<[[u32; 3]]> = [[0, 1, 2]].into();
     let softness = EdgeSoftness::new(Family::Logistic);
     let image = |first: usize, count: usize| -> Vec<f64> {
-        let phi = tensor::<Wgpu, 1>(&softness.default_phi(0.1), [1], DType::F32);
+        let phi = tensor::<Gpu, 1>(&softness.default_phi(0.1), [1], DType::F32);
         let part = &vertices[9 * first..9 * (first + count)];
-        let part = tensor::<Wgpu, 3>(part, [count, 3, 3], DType::F32);
+        let part = tensor::<Gpu, 3>(part, [count, 3, 3], DType::F32);
         let silhouette = Rasterizer::new(1).prepare(&faces, softness, &phi);
         silhouette.coverage(part, phi).into_data().iter().collect()
     };
@@ -164,7 +160,7 @@ fn the_same_numbers_come_out_every_time() {
     let sphere = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, 0.02);
     let cut = Scene { size: 150.into(), ..random(softness, 0.05) };
     for scene in [sphere, cut] {
-        let products = || Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+        let products = || Products::new::<Gpu>(&scene, DType::F32, Path::Fused);
         assert_eq!(products(), products());
     }
 }
@@ -204,7 +200,7 @@ fn every_t_conorm_gives_the_same_image_as_on_the_cpu() {
     ];
     for t_conorm in t_conorms {
         let expected = coverage::<NdArray<f64>>(&scene, t_conorm, DType::F64);
-        let found = coverage::<Wgpu>(&scene, t_conorm, DType::F32);
+        let found = coverage::<Gpu>(&scene, t_conorm, DType::F32);
         let off = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         println!("{t_conorm}: {off:.1e}");
         assert!(off <= 1e-5, "{t_conorm}: a pixel is off by {off:e}");
@@ -223,7 +219,7 @@ fn more_large_faces_than_can_be_cut_are_drawn_whole() {
     let scene =
         Scene { vertices: corners, views: 1, faces, size: 100.into(), softness, scale: 0.02 };
     let expected = coverage::<NdArray<f64>>(&scene, TConorm::Probabilistic, DType::F64);
-    let found = coverage::<Wgpu>(&scene, TConorm::Probabilistic, DType::F32);
+    let found = coverage::<Gpu>(&scene, TConorm::Probabilistic, DType::F32);
     for (pixel, (found, expected)) in found.iter().zip(&expected).enumerate() {
         assert!((found - expected).abs() <= 1e-5, "pixel {pixel}: {found}, not {expected}");
     }
@@ -240,7 +236,7 @@ fn broken_vertices_give_finite_numbers() {
     for (face, value) in broken.into_iter().enumerate() {
         scene.vertices[9 * face + face % 3] = value;
     }
-    let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+    let found = Products::new::<Gpu>(&scene, DType::F32, Path::Fused);
     assert!(found.image.iter().all(|a| (0.0..=1.0).contains(a)), "{:?}", found.image);
     for numbers in &found.products {
         assert!(numbers.iter().all(|x| x.is_finite()), "{numbers:?}");
