@@ -6,3 +6,6 @@ mod gpu;
 mod triangles;
 
 use softrast_raster::{Wgpu as Gpu, adapter_name as device_name};
+
+/// Copies of a step. There are none: burn uploads tensors without gaps.
+const COPIES: usize = 0;
