@@ -29,14 +29,14 @@ pub(crate) fn check_progress(progress: f64) -> PyResult<()> {
 }
 
 /// `name` is that of the argument, `of` that of the softness, which has `expected` parameters.
-pub(crate) fn check_phi(name: &str, of: &str, expected: usize, phi: &[f64]) -> PyResult<()> {
+pub(crate) fn check_phi(name: &str, of: &str, expected: usize, phi: &[f64]) -> Result<(), String> {
     if phi.len() != expected {
         let found = phi.len();
-        return Err(refused(format!("{name} of {of} has {expected} parameters, found {found}")));
+        return Err(format!("{name} of {of} has {expected} parameters, found {found}"));
     }
     match phi.iter().position(|x| !x.is_finite()) {
         None => Ok(()),
-        Some(k) => Err(refused(format!("{name}[{k}] is {}, expected a finite number", phi[k]))),
+        Some(k) => Err(format!("{name}[{k}] is {}, expected a finite number", phi[k])),
     }
 }
 

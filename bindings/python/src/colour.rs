@@ -1,23 +1,26 @@
 //! Soft colours of one mesh topology.
 
+use std::sync::Arc;
+
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use softrast_raster::{ImageSize, Weighting};
-use softrast_softness::{DepthSoftness, Softness as _};
+use softrast_softness::DepthSoftness;
 use softrast_tensor::NdArray;
 
 use crate::{
-    checks::{check_phi, check_size, check_tolerance, corners, least},
+    checks::{check_size, check_tolerance, corners, least},
+    function::Function,
     guard::{guarded, refused},
-    op::Op,
+    passes::Blends,
     softness::Softness,
 };
 
 /// A renderer of images in colours: everything except vertices, attributes, background and φ.
 #[pyclass(frozen, module = "softrast._native")]
 pub(crate) struct ColourRenderer {
-    renderer: softrast_raster::ColourRenderer,
-    faces: std::sync::Arc<[[u32; 3]]>,
+    renderer: Arc<softrast_raster::ColourRenderer>,
+    faces: Arc<[[u32; 3]]>,
     size: [usize; 2],
     log_weight: f64,
 }
@@ -70,7 +73,7 @@ impl ColourRenderer {
             (renderer, behind.log_weight.into_scalar())
         };
         let (renderer, log_weight) = guarded(py, of)?;
-        Ok(Self { renderer, faces, size, log_weight })
+        Ok(Self { renderer: Arc::new(renderer), faces, size, log_weight })
     }
 
     /// Parameters φ of the softness by edge, `[P]`, float64: those that are drawn with where no others are given.
@@ -127,24 +130,16 @@ impl ColourRenderer {
         )
     }
 
-    /// Knots for these parameters and this logarithm of the background's weight; `entries` `[F, 3]` say which entry of the attributes each
-    /// corner has, and are those of the vertices where None is given. `texture` has its rows and columns.
-    #[pyo3(signature = (phi, phi_depth, log_weight, entries, texture))]
-    fn prepared(
+    /// The function from vertices `[views, 3, V]`, attributes `[1 or views, entries, numbers]`, both φ in a row `[P + Q]`, a background with the
+    /// logarithm of its weight `[channels + 1]` and, if there is one, a texture `[texels, 4]` to images `[views, channels + 1, height, width]`.
+    /// `entries` `[F, 3]` say which entry of the attributes each corner has, and are those of the vertices where None is given. `texture` has its
+    /// rows and columns.
+    #[pyo3(signature = (entries, texture))]
+    fn blend(
         &self,
-        py: Python<'_>,
-        phi: Vec<f64>,
-        phi_depth: Vec<f64>,
-        log_weight: f64,
         entries: Option<PyReadonlyArray2<'_, i64>>,
         texture: Option<[usize; 2]>,
-    ) -> PyResult<PreparedColour> {
-        let weighting = self.renderer.weighting();
-        check_phi("phi", weighting.edge.family.name(), weighting.edge.parameters(), &phi)?;
-        check_phi("phi_depth", weighting.depth.name(), weighting.depth.parameters(), &phi_depth)?;
-        if !log_weight.is_finite() {
-            return Err(refused(format!("log_weight is {log_weight}, expected a finite number")));
-        }
+    ) -> PyResult<Function> {
         let entries =
             entries.map_or_else(|| Ok(self.faces.clone()), |entries| corners(&entries))?;
         if entries.len() != self.faces.len() {
@@ -154,34 +149,7 @@ impl ColourRenderer {
                 entries.len()
             )));
         }
-        let split = phi.len();
-        let least_entries = least(&entries);
-        let phi = [phi, phi_depth];
-        let (op, tables) = guarded(py, || self.renderer.op(&phi, log_weight, entries, texture))?;
-        let sizes = [least(&self.faces), least_entries];
-        let blend = Op::blend(op, tables.rows(), sizes, self.size, texture);
-        let parameters = phi.iter().map(Vec::len).sum();
-        Ok(PreparedColour { blend, tables: Op::weight_tables(tables, split, parameters) })
-    }
-}
-
-/// A renderer of colours for one φ, with knots for it.
-#[pyclass(frozen, module = "softrast._native")]
-pub(crate) struct PreparedColour {
-    blend: Op,
-    tables: Op,
-}
-
-#[pymethods]
-impl PreparedColour {
-    /// The op from vertices `[views, 3, V]`, attributes `[1 or views, entries, numbers]`, tables `[rows, 4]`, a background `[channels + 1]`
-    /// and, if there is one, a texture `[texels, 4]` to an image `[views, channels + 1, height, width]`.
-    fn blend(&self) -> Op {
-        self.blend.clone()
-    }
-
-    /// The op from both φ in a row, `[P + Q]`, to tables `[rows, 4]`.
-    fn tables(&self) -> Op {
-        self.tables.clone()
+        let (renderer, faces) = (self.renderer.clone(), self.faces.clone());
+        Ok(Function::blend(Blends::new(renderer, faces, entries, self.size, texture)))
     }
 }

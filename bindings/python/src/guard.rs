@@ -64,7 +64,7 @@ pub(crate) fn refused(what: impl Display) -> PyErr {
 }
 
 /// The text of a panic on one line, without the name of the macro that raised it.
-fn message(panic: &(dyn Any + Send)) -> String {
+pub(crate) fn message(panic: &(dyn Any + Send)) -> String {
     let text = match (panic.downcast_ref::<String>(), panic.downcast_ref::<&str>()) {
         (Some(text), _) => text,
         (_, Some(text)) => *text,

@@ -1,14 +1,19 @@
-//! The Rust side of the Python package `softrast`: ops over NumPy arrays, each with the two passes back. It has no kernel of its own.
+//! The Rust side of the Python package `softrast`: functions of arrays with derivatives of both orders, called by Python and by XLA. It has no
+//! kernel of its own.
 //!
 //! The Python side (`python/softrast`) checks shapes in the user's terms; here only what would be wrong or unsafe to run is refused. Every
 //! error and panic arrives there as a `ValueError` of one line.
 
+mod arrays;
 mod checks;
 mod colour;
+mod function;
 mod guard;
+mod knots;
 mod learn;
 mod meshes;
 mod op;
+mod passes;
 mod pose;
 mod renderer;
 mod shape;
@@ -16,6 +21,7 @@ mod softness;
 mod taped;
 mod views;
 mod watched;
+mod xla;
 
 use pyo3::prelude::*;
 
@@ -26,16 +32,17 @@ mod _native {
 
     #[pymodule_export]
     use crate::{
-        colour::{ColourRenderer, PreparedColour},
+        colour::ColourRenderer,
+        function::{Function, iou_loss, mse_loss, orbit_matrix, perspective},
         guard::threads,
         learn::learn_softness,
         meshes::{fox, icosphere, load_mesh, save_mesh},
-        op::{Op, iou_loss, mse_loss, orbit_matrix, perspective},
         pose::{find_pose, load_mask},
-        renderer::{Prepared, Renderer, hard_silhouette},
+        renderer::{Renderer, hard_silhouette},
         shape::{fit_mesh, paint},
         softness::{Softness, families, learned_names},
         views::{load_views, view_iou, view_psnr},
+        xla::xla_handler,
     };
 
     #[pymodule_init]

@@ -1,39 +1,25 @@
 //! Renderers: faces, image size, softness, T-conorm and tolerance.
 
+use std::sync::Arc;
+
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use softrast_raster::{
-    HostBackend, Projected, SoftRenderer, TConorm,
-    low_level::{Rasterizer, Silhouette},
-};
-use softrast_softness::{EdgeSoftness, Softness as _};
+use softrast_raster::{HostBackend, Projected, TConorm, low_level::Rasterizer};
 use softrast_tensor::{DType, Tensor, TensorData};
 
 use crate::{
-    checks::{check_phi, check_progress, check_size, check_tolerance, corners, least},
+    checks::{check_progress, check_size, check_tolerance, corners, least},
+    function::Function,
     guard::{guarded, refused},
-    op::Op,
+    passes::Silhouettes,
     softness::Softness,
 };
 
 /// A renderer of silhouettes: everything except vertices and φ. It chooses supports and knots.
 #[pyclass(frozen, module = "softrast._native")]
 pub(crate) struct Renderer {
-    renderer: SoftRenderer<EdgeSoftness>,
+    scene: Arc<Silhouettes>,
     faces: usize,
-    t_conorm: TConorm,
-    least_vertices: usize,
-    size: [usize; 2],
-}
-
-/// A renderer for one φ, with support and knots for it.
-#[pyclass(frozen, module = "softrast._native")]
-pub(crate) struct Prepared {
-    silhouette: Silhouette<EdgeSoftness>,
-    t_conorm: TConorm,
-    parameters: usize,
-    least_vertices: usize,
-    size: [usize; 2],
 }
 
 #[pymethods]
@@ -59,95 +45,55 @@ impl Renderer {
         let rasterizer =
             Rasterizer { culls: cull_back_faces, tolerance, t_conorm, ..Rasterizer::new(size) };
         let renderer = guarded(py, || softness.0.renderer_at(progress, rasterizer, faces))?;
-        Ok(Self { renderer, faces: count, t_conorm, least_vertices, size })
+        let scene = || Silhouettes::new(renderer, t_conorm, least_vertices, size);
+        let scene = py.detach(scene).map_err(refused)?;
+        Ok(Self { scene: Arc::new(scene), faces: count })
     }
 
     /// Parameters φ `[P]`, float64: those that are drawn with where no others are given.
     #[getter]
     fn phi<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, self.renderer.phi())
+        PyArray1::from_slice(py, self.scene.renderer.phi())
     }
 
     /// Height and width of the image, in pixels.
     #[getter]
     fn size(&self) -> (usize, usize) {
-        (self.size[0], self.size[1])
+        self.scene.size.into()
     }
 
     /// The largest error of a pixel under φ, in coverage: the tolerance, or more where no table can follow the softness to it.
     #[getter]
     fn error_bound(&self, py: Python<'_>) -> PyResult<f64> {
-        guarded(py, || self.renderer.error_bound::<HostBackend>())
+        guarded(py, || self.scene.renderer.error_bound::<HostBackend>())
     }
 
     /// How many vertices the faces ask for.
     #[getter]
     fn least_vertices(&self) -> usize {
-        self.least_vertices
+        self.scene.least_vertices
     }
 
     fn __repr__(&self) -> String {
-        let ([height, width], faces) = (self.size, self.faces);
-        let softness = self.renderer.softness().family;
-        let felt = if self.renderer.surrogate().is_some() { ", with a surrogate" } else { "" };
+        let ([height, width], faces) = (self.scene.size, self.faces);
+        let renderer = &self.scene.renderer;
+        let softness = renderer.softness().family;
+        let felt = if renderer.surrogate().is_some() { ", with a surrogate" } else { "" };
         format!("Renderer({height} x {width} pixels, {faces} faces, {softness}{felt})")
     }
 
-    /// Support and knots for `phi`.
-    fn prepared(&self, py: Python<'_>, phi: Vec<f64>) -> PyResult<Prepared> {
-        self.prepared_of(py, &self.renderer, &phi)
+    /// The function from vertices `[views, 3, V]` and, unless it is the renderer's own, φ `[P]` to coverage `[views, height, width]`.
+    fn silhouette(&self, own: bool) -> Function {
+        Function::silhouette(self.scene.clone(), own)
     }
 
-    /// The surrogate, if the softness has one: its φ `[P]`, float64, and support and knots for it.
-    #[allow(clippy::type_complexity)]
-    fn surrogate<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Prepared)>> {
-        let Some(renderer) = self.renderer.surrogate() else { return Ok(None) };
-        let prepared = self.prepared_of(py, renderer, renderer.phi())?;
-        Ok(Some((PyArray1::from_slice(py, renderer.phi()), prepared)))
-    }
-}
-
-impl Renderer {
-    fn prepared_of(
-        &self,
-        py: Python<'_>,
-        renderer: &SoftRenderer<EdgeSoftness>,
-        phi: &[f64],
-    ) -> PyResult<Prepared> {
-        let softness = renderer.softness();
-        let parameters = softness.parameters();
-        check_phi("phi", softness.family.name(), parameters, phi)?;
-        let silhouette = guarded(py, || renderer.prepared::<HostBackend>(phi))?;
-        let &Self { t_conorm, least_vertices, size, .. } = self;
-        Ok(Prepared { silhouette, t_conorm, parameters, least_vertices, size })
-    }
-}
-
-#[pymethods]
-impl Prepared {
-    /// The op from vertices `[views, 3, V]` and a table to sums `[views, height, width]`.
-    fn sum(&self) -> Op {
-        Op::sum(&self.silhouette, self.least_vertices, self.size)
-    }
-
-    /// The op from φ `[P]` to a table `[rows, 4]`.
-    fn table(&self) -> Op {
-        Op::table(&self.silhouette, self.parameters)
-    }
-
-    /// The op from sums to coverage in [0, 1].
-    fn coverage(&self) -> Op {
-        Op::coverage(self.t_conorm)
-    }
-
-    /// Distances in NDC beyond which a pixel outside and inside sees a constant.
-    #[getter]
-    fn support(&self) -> (f64, f64) {
-        let [outer, inner] = self.silhouette.profile().support();
-        (outer, inner)
+    /// The surrogate, if the softness has one: its silhouettes `[views, height, width]` under its own φ.
+    fn surrogate(&self, py: Python<'_>) -> PyResult<Option<Function>> {
+        let &Silhouettes { t_conorm, least_vertices, size, .. } = &*self.scene;
+        let Some(renderer) = self.scene.renderer.surrogate() else { return Ok(None) };
+        let scene = || Silhouettes::new(renderer.clone(), t_conorm, least_vertices, size);
+        let scene = py.detach(scene).map_err(refused)?;
+        Ok(Some(Function::silhouette(Arc::new(scene), true)))
     }
 }
 

@@ -69,7 +69,7 @@ impl Softness {
     /// This softness with other parameters, `[P]`, without a schedule and without a surrogate.
     fn with_phi(&self, phi: Vec<f64>) -> PyResult<Self> {
         let softness = self.0.softness;
-        check_phi("phi", softness.family.name(), softness.parameters(), &phi)?;
+        check_phi("phi", softness.family.name(), softness.parameters(), &phi).map_err(refused)?;
         let (schedule, feedback, surrogate) = (None, None, None);
         Ok(Self(ScheduledSoftness { phi, schedule, feedback, surrogate, ..self.0.clone() }))
     }

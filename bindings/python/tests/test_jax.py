@@ -1,5 +1,8 @@
 """The functions for JAX: values, derivatives of both orders, jit and vmap."""
 
+import gc
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -10,6 +13,7 @@ import jax.numpy as jnp  # noqa: E402
 from jax.test_util import check_grads  # noqa: E402
 
 import softrast.jax as sj  # noqa: E402
+from softrast import _passes  # noqa: E402
 
 FACES = [[0, 1, 2], [1, 3, 2]]
 CORNERS = np.array([[-0.6, -0.5, 0.1], [0.5, -0.6, -0.2], [0.05, 0.55, 0.0], [0.8, 0.4, 0.3]])
@@ -192,3 +196,145 @@ def test_a_third_derivative_is_refused():
         f = (lambda g: lambda x: (jax.grad(g)(x) ** 2).sum())(f)
     with pytest.raises(ValueError, match="not a third time"):
         jax.grad(f)(CORNERS)
+
+
+def squares(draw):
+    return lambda corners, cameras, phi: (image(draw, corners, cameras, phi) ** 2).sum()
+
+
+DERIVATIVES = {
+    "value_and_grad": lambda loss: jax.value_and_grad(loss, (0, 1, 2)),
+    "jvp": lambda loss: lambda *x: jax.jvp(loss, x, tuple(jnp.ones_like(part) for part in x)),
+    "hessian": lambda loss: jax.hessian(loss, (0, 1, 2)),
+    "vmap": lambda loss: jax.vmap(jax.grad(lambda corners, camera, phi: loss(corners, camera[None], phi)), (None, 0, None)),
+}
+
+
+@pytest.mark.parametrize("wide", [True, False], ids=["f64", "f32"])
+@pytest.mark.parametrize("derivative", DERIVATIVES)
+def test_a_derivative_is_the_same_compiled(derivative, wide):
+    jax.config.update("jax_enable_x64", wide)
+    draw = renderer()
+    of = DERIVATIVES[derivative](squares(draw))
+    given = tuple(jnp.asarray(x) for x in (CORNERS, CAMERAS, draw.phi))
+    found, expected = (jax.tree.leaves(f(*given)) for f in (jax.jit(of), of))
+    assert len(found) == len(expected)
+    for a, b in zip(found, expected):
+        assert a.dtype == b.dtype == (jnp.float64 if wide else jnp.float32)
+        assert np.abs(a - b).max() <= (1e-12 if wide else 1e-5) * (1.0 + np.abs(b).max())
+
+
+def test_colours_of_32_bits_are_the_same_compiled():
+    jax.config.update("jax_enable_x64", False)
+    draw = softrast.ColourRenderer(FACES, (4, 3), softrast.Softness("logistic", 0.2), [1.5, 3.5], depth_scale=0.3)
+    seen, values = jnp.asarray(softrast.project(CORNERS, CAMERAS), jnp.float32), jnp.asarray(np.random.default_rng(0).random((4, 2)), jnp.float32)
+    loss = lambda seen, values, phi: (sj.blend(draw, seen, values, 0.5, phi=phi) ** 2).sum()
+    given = seen, values, jnp.asarray(draw.phi)
+    for of in (jax.value_and_grad(loss, (0, 1, 2)), jax.hessian(loss, (1, 2))):
+        for a, b in zip(*(jax.tree.leaves(f(*given)) for f in (jax.jit(of), of))):
+            assert a.dtype == jnp.float32 and np.abs(a - b).max() <= 1e-5 * (1.0 + np.abs(b).max())
+
+
+def test_phi_may_be_wider_than_the_vertices():
+    draw = renderer()
+    seen = jnp.asarray(softrast.project(CORNERS, CAMERAS), jnp.float32)
+    loss = lambda seen, phi: sj.silhouette(draw, seen, phi).sum()
+    for of in (jax.grad(loss, (0, 1)), jax.jit(jax.grad(loss, (0, 1)))):
+        by_seen, by_phi = of(seen, jnp.asarray(draw.phi))
+        assert by_seen.dtype == jnp.float32 and by_phi.dtype == jnp.float64 and jnp.abs(by_phi[0]) > 0.0
+
+
+def test_compiled_functions_call_no_python():
+    draw = renderer()
+    text = jax.jit(jax.grad(squares(draw))).lower(CORNERS, CAMERAS, draw.phi).as_text()
+    assert "@softrast" in text and "callback" not in text
+
+
+def test_a_function_cannot_be_compiled_for_a_gpu():
+    draw = renderer()
+    traced = jax.jit(lambda seen: sj.silhouette(draw, seen)).trace(jnp.asarray(softrast.project(CORNERS, CAMERAS)))
+    with pytest.raises(ValueError, match="softrast draws on the CPU, found a function that is compiled for cuda"):
+        traced.lower(lowering_platforms=("cuda",))
+
+
+def test_a_compiled_function_keeps_its_renderer():
+    seen = jnp.asarray(softrast.project(CORNERS, CAMERAS))
+
+    def compiled():
+        draw = renderer()
+        of = jax.jit(lambda seen: sj.silhouette(draw, seen))
+        return of.lower(seen).compile(), of, draw._by_own.handle, draw._by_own.id, softrast.silhouette(draw, seen)
+
+    early, of, handle, number, expected = compiled()
+    assert np.array_equal(of(seen), expected)
+    del of
+    jax.clear_caches()
+    gc.collect()
+    assert np.array_equal(early(seen), expected) and handle in _passes._NAMED
+    del early
+    jax.clear_caches()
+    gc.collect()
+    assert handle not in _passes._NAMED
+    with pytest.raises(jax.errors.JaxRuntimeError, match="the renderer of a compiled function is gone"):
+        called(number, [jnp.swapaxes(seen, 1, 2)], [expected, expected])
+
+
+def called(function, arrays, results, order=0, along=0, wanted=0):
+    """The results of a call by XLA of the handler itself."""
+    like = [jax.ShapeDtypeStruct(result.shape, result.dtype) for result in results]
+    settings = dict(function=function, order=order, along=along, wanted=wanted)
+    return jax.ffi.ffi_call("softrast", like)(*arrays, **{name: np.int64(number) for name, number in settings.items()})
+
+
+VERTICES, IMAGE = np.zeros((2, 3, 4)) + 1.0, np.zeros((2, 6, 5))
+
+
+@pytest.mark.parametrize("arrays, results, settings, message", [
+    ([VERTICES[:, :2]], [IMAGE] * 2, {}, "shapes do not fit"),
+    ([VERTICES[:, :, :3]], [IMAGE] * 2, {}, "shapes do not fit"),
+    ([VERTICES[0, 0]], [IMAGE] * 2, {}, "shapes do not fit"),
+    ([], [IMAGE] * 2, {}, "shapes do not fit"),
+    ([VERTICES.astype("i4")], [IMAGE] * 2, {}, "must be float32 or float64"),
+    ([VERTICES, IMAGE, IMAGE.astype("f4")], [VERTICES], dict(order=3, wanted=1), "must be of one type"),
+    ([VERTICES, IMAGE, IMAGE[:1]], [VERTICES], dict(order=3, wanted=1), "shapes do not fit"),
+    ([VERTICES], [IMAGE], {}, "has 2 results, XLA expects 1"),
+    ([VERTICES], [IMAGE, IMAGE[:1]], {}, "a result is"),
+    ([VERTICES], [IMAGE, IMAGE.astype("f4")], {}, "a result is"),
+    ([VERTICES], [IMAGE] * 2, dict(order=7), "no such derivative"),
+    ([VERTICES], [IMAGE] * 2, dict(order=np.int64(-1)), "no such derivative"),
+])
+def test_the_handler_refuses_calls_that_do_not_fit(arrays, results, settings, message):
+    draw = renderer()
+    assert np.asarray(called(draw._by_own.id, [VERTICES], [IMAGE] * 2)).shape == (2, *IMAGE.shape)
+    with pytest.raises(jax.errors.JaxRuntimeError, match=message):
+        called(draw._by_own.id, arrays, results, **settings)
+
+
+def test_the_handler_refuses_attributes_of_other_types():
+    like = [jax.ShapeDtypeStruct(IMAGE.shape, IMAGE.dtype)] * 2
+    for attributes, message in ((dict(function=np.int32(1)), "function is no int64"), (dict(order=np.int64(0)), "function is missing")):
+        with pytest.raises(jax.errors.JaxRuntimeError, match=message):
+            jax.ffi.ffi_call("softrast", like)(VERTICES, **attributes)
+
+
+def test_a_compiled_function_refuses_values_in_one_line():
+    draw = renderer()
+    seen = softrast.project(CORNERS, CAMERAS)
+    of = jax.jit(lambda phi: sj.silhouette(draw, seen, phi))
+    with pytest.raises(jax.errors.JaxRuntimeError, match=r"phi\[0\] is NaN, expected a finite number"):
+        of(np.array([np.nan]))
+    paint = softrast.ColourRenderer(FACES, (4, 3), softrast.Softness("logistic", 0.2), [1.5, 3.5])
+    with pytest.raises(jax.errors.JaxRuntimeError, match="attributes must be finite"):
+        jax.jit(lambda values: sj.blend(paint, seen, values))(np.full((4, 2), np.inf))
+
+
+def test_threads_draw_what_one_draws():
+    draws = [renderer(), renderer(softness=softrast.Softness("gauss", 0.05))]
+    steps = [jax.jit(jax.value_and_grad(squares(draw), (0, 1, 2))) for draw in draws]
+    scenes = [(k % 2, CORNERS + 0.01 * k, CAMERAS, draws[k % 2].phi * (1.0 + 0.1 * (k // 4))) for k in range(24)]
+    of = lambda scene: jax.tree.leaves(steps[scene[0]](*scene[1:]))
+    expected = [of(scene) for scene in scenes]
+    with ThreadPoolExecutor(2) as threads:
+        for _ in range(3):
+            for found, one in zip(threads.map(of, scenes), expected):
+                assert all(map(np.array_equal, found, one))

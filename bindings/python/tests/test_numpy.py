@@ -77,7 +77,7 @@ def test_bad_input_is_an_error_of_one_line(call, message):
 def test_cameras_of_another_float_type_are_taken_in_that_of_the_vertices():
     assert softrast.project(CORNERS.astype("f4"), softrast.orbit(3.0)).dtype == np.float32
     with pytest.raises(ValueError, match="of one type, float32 or float64"):
-        softrast._native.perspective().forward([CORNERS, softrast._native.orbit_matrix().forward([softrast.orbit(3.0).astype("f4")])])
+        softrast._native.perspective().call("image", [CORNERS, np.zeros((1, 3, 4), "f4")], [], [])
 
 
 def test_a_softness_with_a_surrogate_draws_its_own_image():

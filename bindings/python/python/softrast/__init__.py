@@ -16,7 +16,7 @@ from typing import Optional as _Optional, Tuple as _Tuple, Union as _Union
 import numpy as _np
 from numpy.typing import ArrayLike as _ArrayLike
 
-from . import _cameras, _native, _shapes
+from . import _cameras, _native, _passes, _shapes
 from ._learning import LearnedSoftness, learn_softness
 from ._meshes_of_views import FoundMesh, fit_mesh, paint
 from ._native import Softness, __version__, families, learned_names
@@ -96,9 +96,10 @@ def project(vertices: _ArrayLike, cameras: _ArrayLike) -> _np.ndarray:
     vertices = vertices[None] if vertices.ndim == 2 else vertices
     views = _shapes.project(vertices.shape, cameras.shape)
     if cameras.ndim == 2:
-        cameras = _native.orbit_matrix().forward([cameras])
+        (cameras,) = _passes.ORBIT_MATRIX.call("image", [cameras], [], [])
     cameras = _np.broadcast_to(cameras, (views, 3, 4))
-    return _native.perspective().forward([_np.ascontiguousarray(x) for x in (vertices, cameras)]).swapaxes(1, 2)
+    (seen,) = _passes.PERSPECTIVE.call("image", [_np.ascontiguousarray(x) for x in (vertices, cameras)], [], [])
+    return seen.swapaxes(1, 2)
 
 
 def silhouette(renderer: Renderer, vertices: _ArrayLike, phi: _Optional[_ArrayLike] = None) -> _np.ndarray:
@@ -108,9 +109,9 @@ def silhouette(renderer: Renderer, vertices: _ArrayLike, phi: _Optional[_ArrayLi
     """
     vertices = _shapes.floats(vertices, "vertices")
     _shapes.vertices(vertices.shape, renderer._least)
-    drawn = renderer._scene._drawing(renderer._scene.phi if phi is None else _shapes.vector(phi, "phi"))
-    sums = drawn.op.forward([_np.ascontiguousarray(vertices.swapaxes(1, 2)), drawn.table(vertices.dtype)])
-    return drawn.coverage.forward([sums])
+    function = renderer._by_own if phi is None else renderer._by_phi
+    inputs = [_np.ascontiguousarray(vertices.swapaxes(1, 2)), *([] if phi is None else [_shapes.vector(phi, "phi")])]
+    return function.call("image", inputs, [], [])[0]
 
 
 def hard_silhouette(vertices: _ArrayLike, faces: _ArrayLike, size: _Size) -> _np.ndarray:
@@ -163,4 +164,4 @@ def blend(
     behind = _np.append(_np.broadcast_to(background, channels), log_weight).astype(dtype)
     function = renderer._blend(corners, size)
     inputs = [vertices.swapaxes(1, 2), attributes, _np.concatenate([phi, phi_depth]), behind, *([] if texture is None else [texture])]
-    return function.forward([_np.ascontiguousarray(array) for array in inputs])[0]
+    return function.call("image", [_np.ascontiguousarray(array) for array in inputs], [], [])[0]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 
-import numpy as np
 import torch
 
 from . import _passes
@@ -78,19 +77,8 @@ def _apart(of, tensors):
 
 def _computed(order, name, tensors, along, wanted):
     """The results of an op, computed on the host."""
-    of = _passes.function(name)
     arrays = [tensor.detach().contiguous().numpy() for tensor in tensors]
-    inputs, kept, rest = _apart(of, arrays)
-    if order == "":
-        found = of.forward(inputs)
-    elif order == "_vjp":
-        found = of.vjp(inputs, kept, rest[0], list(wanted))
-    elif order == "_jvp":
-        upstream = np.zeros(of.shapes(*(array.shape for array in inputs))[0], inputs[0].dtype)
-        found = of.vjp_of_vjp(inputs, kept, upstream, _spread(rest, along), [False] * of.count + [True])
-    else:
-        found = of.vjp_of_vjp(inputs, kept, rest[0], _spread(rest[1:], along), list(wanted))
-    return [torch.from_numpy(np.ascontiguousarray(part)) for part in found if part is not None]
+    return [torch.from_numpy(part) for part in _passes.function(name).call(order[1:] or "value", arrays, list(along), list(wanted))]
 
 
 # The derivatives of the ops, by other ops: `call(order, name, tensors, along, wanted)`.

@@ -12,7 +12,15 @@ import numpy as np
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
+from . import _native
+
+_CPU = "softrast draws on the CPU"
 _THIRD = "softrast can be differentiated twice, not a third time"
+
+# The handler of compiled functions, and the names of the derivatives that it computes, in its order.
+_TARGET = "softrast"
+_ORDERS = "value", "image", "jvp", "vjp", "vjp_of_vjp"
+jax.ffi.register_ffi_target(_TARGET, _native.xla_handler(), platform="cpu")
 
 
 def _apart(of, arrays):
@@ -31,42 +39,25 @@ def _lead(of, array):
     return array.shape[:array.ndim - of.axes[0]]
 
 
-def _computed(order, of, along, wanted, arrays):
-    """The results of a primitive for one scene, computed on the host."""
-    inputs, kept, rest = _apart(of, arrays)
-    if order == "value":
-        return of.forward(inputs)
-    if order == "jvp":
-        upstream = np.zeros(of.shapes(*(array.shape for array in inputs))[0], inputs[0].dtype)
-        found = of.vjp_of_vjp(inputs, kept, upstream, _spread(rest, along), [False] * of.count + [True])
-    elif order == "vjp":
-        found = of.vjp(inputs, kept, rest[0], list(wanted))
-    else:
-        found = of.vjp_of_vjp(inputs, kept, rest[0], _spread(rest[1:], along), [*wanted, False])
-    return [part for part in found if part is not None]
-
-
-def _on_host(order, of, along, wanted, arrays):
-    arrays = [np.asarray(array) for array in arrays]
-    lead = _lead(of, arrays[0])
-    tails = [np.ascontiguousarray(array).reshape(-1, *array.shape[len(lead):]) for array in arrays]
-    if not lead:
-        return tuple(map(np.ascontiguousarray, _computed(order, of, along, wanted, [array[0] for array in tails])))
-    if of.views:
-        # All that is computed of a view is its own, so views of all scenes go through in one call.
-        found = _computed(order, of, along, wanted, [array.reshape(-1, *array.shape[2:]) for array in tails])
-        return tuple(np.ascontiguousarray(part).reshape(*lead, -1, *part.shape[1:]) for part in found)
-    each = [_computed(order, of, along, wanted, [array[k] for array in tails]) for k in range(len(tails[0]))]
-    return tuple(np.stack(parts).reshape(*lead, *parts[0].shape) for parts in zip(*each))
+def _on_cpu(array):
+    """An array of NumPy with the same numbers."""
+    if isinstance(array, jax.Array) and any(device.platform != "cpu" for device in array.devices()):
+        raise ValueError(f"{_CPU}, found an array on {', '.join(map(str, array.devices()))}: move it with jax.device_put")
+    return np.ascontiguousarray(array)
 
 
 def _shapes(order, of, along, wanted, arrays):
     inputs, _, rest = _apart(of, arrays)
     lead = _lead(of, inputs[0])
-    if order in ("vjp", "curved"):
+    if order in ("vjp", "vjp_of_vjp"):
         return [(array.shape, array.dtype) for array, want in zip(inputs, wanted) if want]
     found = of.shapes(*(array.shape[len(lead):] for array in inputs))
     return [((*lead, *shape), inputs[0].dtype) for shape in (found if order == "value" else found[:1])]
+
+
+def _bits(flags):
+    """Flags as a number, the first as the lowest bit."""
+    return np.int64(sum(1 << place for place, flag in enumerate(flags) if flag))
 
 
 def _primitive(order):
@@ -76,13 +67,20 @@ def _primitive(order):
     def compute(*arrays, of, along=(), wanted=()):
         if order == "bent":
             raise ValueError("softrast has no forward mode over forward mode: take jax.hessian, or jax.grad of a jvp")
-        return [jnp.asarray(part) for part in _on_host(order, of, along, wanted, arrays)]
+        # No gradients to the upstream.
+        wanted = [*wanted, False] if order == "vjp_of_vjp" else wanted
+        return [jnp.asarray(part) for part in of.call(order, [_on_cpu(array) for array in arrays], along, wanted)]
 
-    def call(*arrays, of, along=(), wanted=()):
+    def lower(ctx, *arrays, of, along=(), wanted=()):
         if order == "bent":
             compute(*arrays, of=of)
-        like = [jax.ShapeDtypeStruct(*one) for one in _shapes(order, of, along, wanted, arrays)]
-        return jax.pure_callback(lambda *arrays: _on_host(order, of, along, wanted, arrays), tuple(like), *arrays)
+        # Compiled code knows the function by its number.
+        ctx.module_context.add_keepalive(of)
+        settings = dict(function=np.int64(of.id), order=np.int64(_ORDERS.index(order)), along=_bits(along), wanted=_bits(wanted))
+        return jax.ffi.ffi_lowering(_TARGET)(ctx, *arrays, **settings)
+
+    def refuse(ctx, *_, **__):
+        raise ValueError(f"{_CPU}, found a function that is compiled for {', '.join(ctx.module_context.platforms)}: use jax.jit on the CPU")
 
     def mapped(arrays, dims, **settings):
         (count,) = {array.shape[dim] for array, dim in zip(arrays, dims) if dim is not None}
@@ -97,14 +95,15 @@ def _primitive(order):
     primitive.def_abstract_eval(lambda *arrays, of, along=(), wanted=(): [
         jax.core.ShapedArray(*one) for one in _shapes(order, of, along, wanted, arrays)
     ])
-    mlir.register_lowering(primitive, mlir.lower_fun(call, multiple_results=True))
+    mlir.register_lowering(primitive, refuse)
+    mlir.register_lowering(primitive, lower, platform="cpu")
     batching.primitive_batchers[primitive] = mapped
     return primitive
 
 
 # Values; derivatives along directions; gradients; gradients of gradients along directions, which are their changes too; and the change of a
 # derivative along directions, which is not computed: it exists to be transposed.
-_VALUE, _JVP, _VJP, _CURVED, _BENT = map(_primitive, ("value", "jvp", "vjp", "curved", "bent"))
+_VALUE, _JVP, _VJP, _CURVED, _BENT = map(_primitive, ("value", "jvp", "vjp", "vjp_of_vjp", "bent"))
 
 
 def value(of, inputs):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections import OrderedDict
 from typing import Any, Dict, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -13,90 +11,6 @@ from . import _native, _passes, _shapes
 from ._native import Softness
 
 Size = Union[int, Sequence[int]]
-
-# Knots stay while no parameter of a softness has moved by more than this. Terms at a fixed distance then move by less than the rounding,
-# 1e-3 of the tolerance, with which knots are chosen: a culled term is exp(-x) with x below 40.
-_HELD = 2e-5
-# Parameters whose tables are kept.
-_DRAWINGS = 64
-
-
-class Drawing:
-    """The ops that draw under some φ, and the tables of φ by float type."""
-
-    def __init__(self, ops: Tuple[Any, ...], phi: NDArray[np.float64]) -> None:
-        self.ops, self.phi = ops, phi
-        self.op, self.tables, self.coverage = ops
-        self._by_type: Dict[Any, NDArray[Any]] = {}
-
-    def table(self, dtype: Any) -> NDArray[Any]:
-        found = self._by_type.get(dtype)
-        if found is None:
-            found = self._by_type[dtype] = self.tables.forward([self.phi]).astype(dtype)
-        return found
-
-
-class Knots:
-    """The latest drawings, by the values that knots follow: φ, and a few others in one vector behind it.
-
-    Values that are within `_HELD` of those that knots were chosen for have the same knots, so that images are smooth there.
-    """
-
-    def __init__(self) -> None:
-        self._drawings: OrderedDict[Any, Drawing] = OrderedDict()
-        self._chosen: Dict[Any, Tuple[NDArray[np.float64], Tuple[Any, ...]]] = {}
-        self._lock = threading.RLock()
-
-    def drawing(self, choose: Any, phi: Any, others: Sequence[float] = (), of: Any = None) -> Drawing:
-        """The drawing for φ; `choose()` are ops with new knots, and `of` is all else that they depend on."""
-        phi = np.array(phi, np.float64)
-        values = np.append(phi, others)
-        key = values.tobytes(), of
-        with self._lock:
-            found = self._drawings.get(key)
-            if found is None:
-                chosen = self._chosen.get(of)
-                if chosen is None or chosen[0].shape != values.shape or not np.abs(chosen[0] - values).max(initial=0.0) <= _HELD:
-                    # One set of knots is enough: the others can be chosen again.
-                    self._chosen = {of: (values, choose())}
-                    chosen = self._chosen[of]
-                found = self._drawings[key] = Drawing(chosen[1], phi)
-                if len(self._drawings) > _DRAWINGS:
-                    self._drawings.popitem(last=False)
-            return found
-
-
-class Silhouettes:
-    """The part of a `Renderer` that its functions hold: no function keeps the renderer alive."""
-
-    def __init__(self, native: _native.Renderer) -> None:
-        self._native, self._knots, self._recent = native, Knots(), _passes.Recent()
-        self.phi, self.size = native.phi, native.size
-        surrogate = native.surrogate()
-        self.surrogate = None if surrogate is None else Drawing(self._ops(surrogate[1]), surrogate[0])
-
-    def _drawing(self, phi: Any) -> Drawing:
-        return self._knots.drawing(lambda: self._ops(self._native.prepared(np.asarray(phi, np.float64))), phi)
-
-    @staticmethod
-    def _ops(prepared: _native.Prepared) -> Tuple[Any, ...]:
-        return prepared.sum(), prepared.table(), prepared.coverage()
-
-
-class Colours:
-    """The part of a `ColourRenderer` that its functions hold."""
-
-    def __init__(self, native: _native.ColourRenderer) -> None:
-        self._native, self._knots, self._recent = native, Knots(), _passes.Recent()
-        self.size, self.parameters = native.size, len(native.phi)
-
-    def _drawing(self, phi: Any, log_weight: float, function: _passes.Blend) -> Drawing:
-        def choose() -> Tuple[Any, ...]:
-            both = np.split(np.asarray(phi, np.float64), [self.parameters])
-            prepared = self._native.prepared(*both, log_weight, function.corners, function.texture)
-            return prepared.blend(), prepared.tables(), None
-
-        return self._knots.drawing(choose, phi, [log_weight], function.handle)
 
 
 class Renderer:
@@ -123,10 +37,9 @@ class Renderer:
             "t_conorm": t_conorm, "cull_back_faces": cull_back_faces,
         }
         self._native = _native.Renderer(*self._settings.values())
-        self._scene = Silhouettes(self._native)
         # Plain attributes: torch.compile reads no others.
-        self._least, self._parameters = self._native.least_vertices, len(self._scene.phi)
-        self._by_own, self._by_phi = (_passes.named(_passes.Silhouette(self._scene, own)) for own in (True, False))
+        self._least, self._parameters = self._native.least_vertices, len(self._native.phi)
+        self._by_own, self._by_phi = (_passes.silhouette(self._native, own) for own in (True, False))
         self._by_own_name, self._by_phi_name = self._by_own.handle, self._by_phi.handle
 
     @property
@@ -186,18 +99,17 @@ class ColourRenderer:
             "progress": progress, "depth": depth, "depth_scale": depth_scale, "tolerance": tolerance, "cull_back_faces": cull_back_faces,
         }
         self._native = _native.ColourRenderer(*self._settings.values())
-        self._scene = Colours(self._native)
         # Plain attributes: torch.compile reads no others.
         self._least, self._log_weight = self._native.least_vertices, self._native.log_weight
         self._phi = tuple(map(float, self._native.phi)), tuple(map(float, self._native.phi_depth))
-        self._functions: Dict[Any, _passes.Blend] = {}
+        self._functions: Dict[Any, _passes.Function] = {}
         self._plain_name = self._blend(None, None).handle
 
-    def _blend(self, corners: Optional[NDArray[np.int64]], texture: Optional[Tuple[int, int]]) -> _passes.Blend:
+    def _blend(self, corners: Optional[NDArray[np.int64]], texture: Optional[Tuple[int, int]]) -> _passes.Function:
         """The function for these corners `[F, 3]` of attributes, or None, and rows and columns of a texture, or None."""
         key = None if corners is None else corners.tobytes(), texture
         if key not in self._functions:
-            self._functions[key] = _passes.named(_passes.Blend(self._scene, corners, texture))
+            self._functions[key] = _passes.blend(self._native, corners, texture)
         return self._functions[key]
 
     @property

@@ -1,8 +1,8 @@
 """The functions of `softrast` for JAX, differentiable twice in forward and reverse mode, on the CPU.
 
-They work under `jax.jit` and `jax.vmap`, by callbacks to the host. Gradients reach vertices, cameras, attributes, background, texture and φ;
-`jax.grad`, `jacfwd`, `jacrev`, `jvp` and `hessian` work, and a third derivative is a `ValueError`. Without `jax_enable_x64`, all is float32.
-Arguments, shapes and units are those of `softrast`, with JAX arrays in the place of NumPy's.
+They work under `jax.jit` and `jax.vmap`; XLA calls compiled functions without Python. Gradients reach vertices, cameras, attributes, background,
+texture and φ; `jax.grad`, `jacfwd`, `jacrev`, `jvp` and `hessian` work, and a third derivative is a `ValueError`. Without `jax_enable_x64`, all is
+float32. Arguments, shapes and units are those of `softrast`, with JAX arrays in the place of NumPy's.
 """
 
 from __future__ import annotations
