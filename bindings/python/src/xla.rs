@@ -171,15 +171,15 @@ unsafe fn answer(frame: &CallFrame) -> Result<(), String> {
     // SAFETY: null or XLA's interface.
     let api = unsafe { frame.api.as_ref() };
     // SAFETY: an extension is null or a struct of XLA's.
-    if let Some(extension) = unsafe { frame.extension_start.as_ref() } {
-        if extension.kind == EXTENSION_METADATA {
-            if extension.struct_size >= size_of::<MetadataExtension>() {
-                // SAFETY: its kind and its size say what it is.
-                let extension = unsafe { &*frame.extension_start.cast::<MetadataExtension>() };
-                describe(unsafe { &mut *extension.metadata }, api);
-            }
-            return Ok(());
+    if let Some(extension) = unsafe { frame.extension_start.as_ref() }
+        && extension.kind == EXTENSION_METADATA
+    {
+        if extension.struct_size >= size_of::<MetadataExtension>() {
+            // SAFETY: its kind and its size say what it is.
+            let extension = unsafe { &*frame.extension_start.cast::<MetadataExtension>() };
+            describe(unsafe { &mut *extension.metadata }, api);
         }
+        return Ok(());
     }
     let Some(Version { major: MAJOR, .. }) = api.map(|api| &api.api_version) else {
         return Err(format!("XLA's interface has another major version, expected {MAJOR}"));
