@@ -8,4 +8,4 @@ mod triangles;
 use softrast_raster::{Cuda as Gpu, cuda_device_name as device_name};
 
 /// Copies of a step: on CUDA burn aligns the rows of some tensors, and the kernels read tensors without gaps.
-const COPIES: usize = 2;
+const COPIES: usize = 4;
