@@ -62,7 +62,7 @@ impl Order {
     ];
 }
 
-/// What is computed: a derivative, the inputs that have a direction, and the inputs (at last the upstream) whose gradients are wanted.
+/// A request: a derivative, the inputs that have a direction, and the inputs (at last the upstream) whose gradients are wanted.
 pub(crate) struct Call<'a> {
     pub(crate) order: Order,
     pub(crate) along: &'a [bool],

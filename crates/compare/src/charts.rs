@@ -10,7 +10,7 @@ use crate::{Record, groups::by_variant};
 
 /// The error of the returned step against seconds, for the methods of one task in one variant.
 pub(crate) struct Chart {
-    /// Of its file.
+    /// File name without its ending.
     pub(crate) name: String,
     pub(crate) caption: String,
     pub(crate) plot: Plot,

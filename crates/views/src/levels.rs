@@ -12,7 +12,7 @@ impl Levels {
     /// White, in steps.
     pub(crate) const MOST: f32 = 65535.0;
 
-    /// The same numbers, in 16 bits if all fit.
+    /// Keeps these numbers, in 16 bits if all fit.
     pub(crate) fn of(levels: &[f32]) -> Self {
         // A float out of range saturates, and then differs from the level.
         let steps: Arc<[u16]> = levels.iter().map(|x| (x * Self::MOST).round() as u16).collect();
