@@ -174,6 +174,31 @@ fn grey_pictures_are_masks_alone_unless_colours_are_asked_for() {
 }
 
 #[test]
+fn masks_alone_are_told_where_one_picture_cannot_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path(), true);
+    let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
+    let words = ["--views", views, "--steps", "5"];
+    let told = |message: &str| {
+        let found = run(&out, &words).unwrap();
+        assert!(found.get("train_psnr").is_none(), "{found}");
+        let warnings = found["warnings"].to_string();
+        assert!(warnings.contains("masks alone") && warnings.contains(message), "{warnings}");
+    };
+    RgbImage::new(30, 22).save(folder.path().join("03.png")).unwrap();
+    told("30 x 22");
+    fs::write(folder.path().join("03.png"), b"no picture").unwrap();
+    told("03.png");
+    fs::remove_file(folder.path().join("03.png")).unwrap();
+    told("03.png");
+    // A folder of masks alone is as the user has it.
+    for k in 0..12 {
+        let _ = fs::remove_file(folder.path().join(format!("{k:02}.png")));
+    }
+    assert!(run(&out, &words).unwrap()["warnings"].as_array().unwrap().is_empty());
+}
+
+#[test]
 fn a_texture_shows_what_is_finer_than_the_faces() {
     let fine = ball().subdivided().subdivided();
     let stripes = |p: &[f64; 3]| p.map(|x| 0.5 + 0.45 * (9.0 * x).sin());

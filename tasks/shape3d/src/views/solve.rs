@@ -89,7 +89,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let pictures = pictures.chain(normals.iter().map(|view| view.picture.clone()));
     // Faults of pictures are reported before the work.
     let sets: Vec<&Vec<View>> = loaded().collect();
-    let painted = painted_views(flags, &sets)?;
+    let (painted, warning) = painted_views(flags, &sets)?;
     let in_colour = painted.is_some();
     if flags.texture_size.is_some() && !in_colour {
         return Err(Error::usage(
@@ -98,7 +98,8 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     }
     given.will_write(names(in_colour), reads.into_inner().into_iter().chain(pictures))?;
     let note = cameras.note().map(str::to_owned);
-    let notes = note.into_iter().chain(loaded().flat_map(|views| reading_notes(views)));
+    let notes =
+        note.into_iter().chain(warning).chain(loaded().flat_map(|views| reading_notes(views)));
     let notes: Vec<String> = notes.collect();
     let count = if let Some(HoldOut::Count(count)) = flags.hold_out { count } else { 0 };
     let normals = match normals.is_empty() {
@@ -174,28 +175,44 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     answer(given, &mesh, textured.as_ref(), &scored, notes, seconds)
 }
 
-/// The views of each set with the colours of their pictures, if these are asked for, or are all there and some are not grey.
+/// The views of each set with the colours of their pictures, if these are asked for, or can all be read and some are not grey; and a warning,
+/// if some picture cannot be read, so that the masks alone are used.
 fn painted_views(
     flags: &Views,
     sets: &[&Vec<View>],
-) -> anyhow::Result<Option<Vec<Vec<PaintedView>>>> {
+) -> anyhow::Result<(Option<Vec<Vec<PaintedView>>>, Option<String>)> {
     if !flags.colour && (flags.masks_only || flags.normals.is_some()) {
-        return Ok(None);
+        return Ok((None, None));
     }
-    let load = |views: &&Vec<View>| views.iter().map(PaintedView::load).collect();
-    let painted: anyhow::Result<Vec<Vec<PaintedView>>> = sets.iter().map(load).collect();
+    let mut failed = Vec::new();
+    let mut painted = Vec::new();
+    for views in sets {
+        let mut of_set = Vec::new();
+        for view in *views {
+            match PaintedView::load(view) {
+                Ok(view) => of_set.push(view),
+                Err(error) if flags.colour => return Err(error),
+                Err(error) => failed.push((view, error)),
+            }
+        }
+        painted.push(of_set);
+    }
     if flags.colour {
-        return painted.map(Some);
+        return Ok((Some(painted), None));
     }
-    let is_coloured =
-        |painted: &Vec<Vec<PaintedView>>| painted.iter().flatten().any(PaintedView::is_coloured);
-    let painted = painted.ok().filter(is_coloured);
-    if painted.is_some() {
-        say(
-            "the pictures have colours, which pull the shape and paint it (--masks-only uses the masks alone)",
-        );
+    let in_colour = painted.iter().flatten().any(PaintedView::is_coloured);
+    // A folder may have masks and no pictures.
+    let told = failed.iter().find(|(view, _)| in_colour || view.picture.is_file());
+    if let Some((_, error)) = told {
+        return Ok((None, Some(format!("the masks alone are used, and no colours: {error:#}"))));
     }
-    Ok(painted)
+    if !in_colour || !failed.is_empty() {
+        return Ok((None, None));
+    }
+    say(
+        "the pictures have colours, which pull the shape and paint it (--masks-only uses the masks alone)",
+    );
+    Ok((Some(painted), None))
 }
 
 /// The views with pictures of their normals: their own, or those of a folder.
