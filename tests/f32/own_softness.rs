@@ -3,7 +3,7 @@
 use softrast_inverse::{
     InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize, pose::PoseSearch,
 };
-use softrast_raster::{Pinhole, Pinholes, hard_silhouette, project, vertices};
+use softrast_raster::{Pinhole, Pinholes, hard_silhouette, project, vertex_tensor};
 use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::{Arctan, lopsided_mesh};
 use softrast_views::{Lens, Picture};
@@ -33,7 +33,7 @@ fn a_camera_is_found_by_a_mask_under_an_own_softness() {
     let (mesh, size) = (lopsided_mesh(), [48, 64]);
     let truth = Pinhole::look_at([2.0, 1.5, -2.5], [0.0; 3], [0.0, 1.0, 0.0], 45.0, size);
     let device = Default::default();
-    let corners = vertices::<NdArray>(mesh.positions(), &device);
+    let corners = vertex_tensor::<NdArray>(mesh.positions(), &device);
     let seen = project(corners, Pinholes::new(&[truth], &device));
     let silhouette: Tensor<NdArray, 3> = hard_silhouette(seen, mesh.faces(), size);
     let mask = Picture::new(silhouette.into_data().iter().collect(), size[1]);

@@ -6,7 +6,7 @@ use burn::module::Param;
 use burn::optim::{AdamConfig, GradientsParams};
 use burn::tensor::Device;
 use softrast_burn::softrast::{mesh, prelude::*};
-use softrast_burn::{Silhouettes, project, vertices};
+use softrast_burn::{Silhouettes, project, vertex_tensor};
 
 fn main() {
     for (step, loss) in fit(64, 200).iter().enumerate().step_by(20) {
@@ -24,9 +24,10 @@ pub(crate) fn fit(size: usize, steps: usize) -> Vec<f32> {
     };
 
     let (fox, sphere) = (mesh::fox(), mesh::icosphere(3));
-    let masks = draw(&fox, 0.003).silhouette(project(vertices(fox.positions(), &device), &cameras)); // [2, size, size]
+    let masks =
+        draw(&fox, 0.003).silhouette(project(vertex_tensor(fox.positions(), &device), &cameras)); // [2, size, size]
     let silhouettes = draw(&sphere, 0.03);
-    let mut corners = Param::from_tensor(vertices(sphere.positions(), &device.autodiff())); // [1, V, 3]
+    let mut corners = Param::from_tensor(vertex_tensor(sphere.positions(), &device.autodiff())); // [1, V, 3]
     let mut adam = AdamConfig::new().init();
     let step = |_| {
         let loss = silhouettes.iou_loss(project(corners.val(), &cameras), masks.clone()).mean();

@@ -5,7 +5,7 @@
 //!
 //! | to | there is |
 //! |---|---|
-//! | project vertices | [`project`], [`project_orbits`], [`vertices`] |
+//! | project vertices | [`project`], [`project_orbits`], [`vertex_tensor`] |
 //! | draw silhouettes, and compare them with masks | [`Silhouettes`] |
 //! | draw colours | [`Colours`] |
 //! | differentiate twice | [`Silhouettes::hvp`], and [`Silhouettes::jvp`] along a direction |
@@ -28,7 +28,7 @@ mod silhouettes;
 
 pub use burn;
 pub use colours::Colours;
-pub use project::{project, project_orbits, vertices};
+pub use project::{project, project_orbits, vertex_tensor};
 pub use silhouettes::{Objective, Silhouettes};
 #[doc(no_inline)]
 pub use softrast;

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Makes a tensor `[1, points, 3]` of points in world units: the vertices of a mesh, in the float type of the device.
-pub fn vertices(positions: &[[f64; 3]], device: &Device) -> Tensor<3> {
+pub fn vertex_tensor(positions: &[[f64; 3]], device: &Device) -> Tensor<3> {
     Tensor::from_data(TensorData::new(positions.concat(), [1, positions.len(), 3]), device)
 }
 

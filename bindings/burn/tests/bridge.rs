@@ -166,11 +166,11 @@ fn values_are_those_of_softrast() {
 fn f32_stays_f32_with_the_values_of_softrast() {
     let mesh = fox();
     let renderer = SoftRenderer::new(mesh.faces(), 24, Family::Gauss, 0.02);
-    let corners = softrast_burn::vertices(mesh.positions(), &Device::flex());
+    let corners = softrast_burn::vertex_tensor(mesh.positions(), &Device::flex());
     let camera = cameras()[0];
     let image = Silhouettes::new(renderer.clone()).silhouette(project(corners, &[camera]));
     assert_eq!((image.dtype(), image.dims()), (DType::F32, [1, 24, 24]));
-    let corners = raster::vertices::<NdArray>(mesh.positions(), &Default::default());
+    let corners = raster::vertex_tensor::<NdArray>(mesh.positions(), &Default::default());
     let pinholes = Pinholes::new(&[camera], &Default::default());
     let expected = renderer.silhouette(raster::project(corners, pinholes));
     near(image, numbers(expected), 1e-6);

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use softrast_mesh::{Mesh, icosphere};
-use softrast_raster::{Orbit, SoftRenderer, mse_loss, project, vertices};
+use softrast_raster::{Orbit, SoftRenderer, mse_loss, project, vertex_tensor};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 
@@ -24,7 +24,7 @@ fn main() {
     let target = Tensor::<B, 3>::zeros([azimuths.len(), size, size], &device);
     let mut times = Vec::new();
     for _ in 0..220 {
-        let corners = vertices::<B>(mesh.positions(), &device).require_grad();
+        let corners = vertex_tensor::<B>(mesh.positions(), &device).require_grad();
         let start = Instant::now();
         let image = renderer.silhouette(project(corners.clone(), cameras.clone()));
         let gradients = mse_loss(image, target.clone()).mean().backward();

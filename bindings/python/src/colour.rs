@@ -76,6 +76,13 @@ impl ColourRenderer {
         Ok(Self { renderer: Arc::new(renderer), faces, size, log_weight })
     }
 
+    /// This renderer for other faces, with its knots and tables where they serve.
+    fn with_faces(&self, py: Python<'_>, faces: PyReadonlyArray2<'_, i64>) -> PyResult<Self> {
+        let faces = corners(&faces)?;
+        let renderer = guarded(py, || self.renderer.with_faces(faces.clone()))?;
+        Ok(Self { renderer: Arc::new(renderer), faces, ..*self })
+    }
+
     /// Parameters φ of the softness by edge, `[P]`, float64: those that are drawn with where no others are given.
     #[getter]
     fn phi<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {

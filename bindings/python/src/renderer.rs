@@ -50,6 +50,17 @@ impl Renderer {
         Ok(Self { scene: Arc::new(scene), faces: count })
     }
 
+    /// This renderer for other faces, with its knots and tables where they serve.
+    fn with_faces(&self, py: Python<'_>, faces: PyReadonlyArray2<'_, i64>) -> PyResult<Self> {
+        let faces = corners(&faces)?;
+        let (least_vertices, count) = (least(&faces), faces.len());
+        let &Silhouettes { t_conorm, size, .. } = &*self.scene;
+        let renderer = guarded(py, || self.scene.renderer.with_faces(faces))?;
+        let scene = || Silhouettes::new(renderer, t_conorm, least_vertices, size);
+        let scene = py.detach(scene).map_err(refused)?;
+        Ok(Self { scene: Arc::new(scene), faces: count })
+    }
+
     /// Parameters φ `[P]`, float64: those that are drawn with where no others are given.
     #[getter]
     fn phi<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {

@@ -1,6 +1,7 @@
 """Functions that need NumPy alone."""
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -212,6 +213,28 @@ except KeyboardInterrupt:
     process.send_signal(signal.SIGINT)
     # A thousand calls would take minutes.
     assert process.wait(timeout=120) == 7
+
+
+def test_other_faces_are_drawn_as_by_a_new_renderer():
+    positions, faces, _ = softrast.icosphere(2)
+    _, finer, _ = softrast.icosphere(3)
+    seen = softrast.project(np.concatenate([positions, np.eye(3)])[None], softrast.orbit(2.5, 10.0, 30.0))
+    settings = {"tolerance": 1e-6, "cull_back_faces": True}
+    soft = softrast.Softness("gauss", 0.05)
+    first = softrast.Renderer(faces, (12, 15), soft, **settings)
+    painter = softrast.ColourRenderer(faces, (12, 15), soft, [1.0, 4.0], **settings)
+    attributes = np.ones((seen.shape[1], 3))
+    # Fewer faces, and their knots serve; more vertices than the mesh has are an error.
+    other, new = first.with_faces(faces[::2]), softrast.Renderer(faces[::2], (12, 15), soft, **settings)
+    assert np.abs(softrast.silhouette(other, seen) - softrast.silhouette(new, seen)).max() < 1e-6
+    assert np.array_equal(other.faces, faces[::2]) and repr(other) == repr(new)
+    assert np.array_equal(softrast.silhouette(pickle.loads(pickle.dumps(other)), seen), softrast.silhouette(new, seen))
+    shown = [softrast.blend(one, seen, attributes) for one in (painter.with_faces(faces[::2]), softrast.ColourRenderer(faces[::2], (12, 15), soft, [1.0, 4.0], **settings))]
+    assert np.abs(shown[0] - shown[1]).max() < 1e-6
+    with pytest.raises(ValueError, match="a face uses vertex"):
+        softrast.silhouette(first.with_faces(finer), seen)
+    with pytest.raises(ValueError, match="at least one face"):
+        first.with_faces(faces[:0])
 
 
 def test_renderers_state_their_error():

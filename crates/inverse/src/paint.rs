@@ -5,7 +5,7 @@ use softrast_mesh::{Edges, Mesh};
 use softrast_meta::{Adam, InnerLoop, descend};
 use softrast_raster::{
     Attributes, ColourRenderer, HostBackend, NEAR, Pinhole, Pinholes, Projected, Weighting,
-    project, vertices,
+    project, vertex_tensor,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
@@ -77,7 +77,7 @@ pub fn paint_until_stopped(
     let framed = frame.mesh(&mesh);
     let cameras: Vec<Pinhole> = cameras.iter().map(|camera| frame.camera(camera)).collect();
     let device = Default::default();
-    let corners = vertices::<HostBackend>(framed.positions(), &device);
+    let corners = vertex_tensor::<HostBackend>(framed.positions(), &device);
     let seen = project(corners, Pinholes::new(&cameras, &device));
     let renderer = renderer(&framed, &faces, size, numbers(seen.clone().tensor().narrow(2, 2, 1)))?;
     let background = renderer.background::<B>(&[0.0; 3], &device);

@@ -15,7 +15,7 @@ use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 ///
 /// ```
 /// use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer, ScheduledSoftness, SoftnessAt};
-/// use softrast_raster::{HostBackend, Projected, low_level::Rasterizer, vertices};
+/// use softrast_raster::{HostBackend, Projected, low_level::Rasterizer, vertex_tensor};
 /// use softrast_softness::{EdgeSoftness, Family};
 /// use softrast_tensor::numbers;
 ///
@@ -24,7 +24,7 @@ use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 /// let (phi, faces) = (layout.start(), Some([[0, 1, 2]].into()));
 /// let renderer = ScheduledRenderer::new(layout, &phi, Rasterizer::new(8), Resolution::Full, faces);
 /// let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
-/// let corners = Projected::new(vertices::<HostBackend>(&corners, &Default::default()));
+/// let corners = Projected::new(vertex_tensor::<HostBackend>(&corners, &Default::default()));
 /// let [first, last] = [0, 9].map(|step| {
 ///     let softness: SoftnessAt<'_, HostBackend> = renderer.at(step);
 ///     numbers(softness.silhouette(corners.clone()))

@@ -1,5 +1,5 @@
 use softrast_mesh::Mesh;
-use softrast_raster::{HostBackend, Pinhole, Pinholes, hard_silhouette, project, vertices};
+use softrast_raster::{HostBackend, Pinhole, Pinholes, hard_silhouette, project, vertex_tensor};
 use softrast_tensor::numbers;
 use softrast_views::Frame;
 
@@ -18,7 +18,7 @@ pub fn silhouette_pixels(mesh: &Mesh, camera: &Pinhole) -> Vec<f64> {
     let device = Default::default();
     let frame = Frame::of_cameras(mesh, [camera]);
     let positions: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| frame.point(p)).collect();
-    let corners = vertices::<HostBackend>(&positions, &device);
+    let corners = vertex_tensor::<HostBackend>(&positions, &device);
     let seen = project(corners, Pinholes::new(&[frame.camera(camera)], &device));
     numbers(hard_silhouette(seen, mesh.faces(), camera.size))
 }

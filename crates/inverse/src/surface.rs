@@ -16,7 +16,7 @@ use softrast_tensor::{
 ///
 /// let sphere = icosphere(1);
 /// let surface = Surface::<NdArray>::new(&sphere, &Default::default());
-/// let vertices = softrast_raster::vertices(sphere.positions(), &Default::default());
+/// let vertices = softrast_raster::vertex_tensor(sphere.positions(), &Default::default());
 /// let bend = surface.normal_consistency(vertices.clone()).into_scalar();
 /// assert!((0.0..0.2).contains(&bend));
 /// let stretched = surface.edge_length(vertices, 0.5).into_scalar();

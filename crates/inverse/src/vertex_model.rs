@@ -44,7 +44,7 @@ impl<B: Backend> VertexModel<B> {
     /// A model with the vertices of the mesh.
     pub fn new(mesh: &Mesh, device: &B::Device) -> Self {
         Self {
-            vertices: Param::from_tensor(softrast_raster::vertices(mesh.positions(), device)),
+            vertices: Param::from_tensor(softrast_raster::vertex_tensor(mesh.positions(), device)),
             surface: Surface::new(mesh, device),
             mesh: Arc::new(mesh.clone()),
         }

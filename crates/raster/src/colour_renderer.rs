@@ -36,13 +36,13 @@ const BEHIND: f64 = 1e-3;
 ///
 /// ```
 /// use softrast_tensor::{Autodiff, NdArray};
-/// use softrast_raster::{Attributes, ColourRenderer, Projected, vertices};
+/// use softrast_raster::{Attributes, ColourRenderer, Projected, vertex_tensor};
 /// use softrast_softness::Family;
 ///
 /// let device = Default::default();
 /// let faces = [[0, 1, 2]];
-/// let corners = vertices::<Autodiff<NdArray>>(&[[-0.5, -0.5, 2.0], [0.5, -0.5, 2.0], [0.0, 0.5, 3.0]], &device);
-/// let red = vertices(&[[1.0, 0.0, 0.0]; 3], &device).require_grad();
+/// let corners = vertex_tensor::<Autodiff<NdArray>>(&[[-0.5, -0.5, 2.0], [0.5, -0.5, 2.0], [0.0, 0.5, 3.0]], &device);
+/// let red = vertex_tensor(&[[1.0, 0.0, 0.0]; 3], &device).require_grad();
 /// let renderer = ColourRenderer::new(&faces, 16, Family::Logistic, 0.01, [1.0, 4.0]);
 /// let background = renderer.background(&[0.0, 0.0, 1.0], &device);
 /// let image = renderer.image(Projected::new(corners), &Attributes::of_vertices(red.clone(), &faces), &background);
@@ -198,6 +198,16 @@ impl<S: Softness> ColourRenderer<S> {
         self.phi = phi;
     }
 
+    /// Sets the parameters of the edge softness to the defaults for this width, as [`SoftRenderer::set_width`](crate::SoftRenderer::set_width)
+    /// does. The depth softness keeps its own.
+    ///
+    /// # Panics
+    ///
+    /// If the width is not positive.
+    pub fn set_width(&mut self, width: impl Into<Width>) {
+        self.phi[0] = width.into().phi(&self.weighting.edge, self.size);
+    }
+
     /// The largest error of a pixel with this background and the renderer's own parameters, relative to the range of the attributes: the
     /// tolerance, or more if a softness has a jump or a corner that no table can resolve. In exact arithmetic.
     pub fn error_bound<B: Backend>(&self, background: &Background<B>) -> f64 {
@@ -252,14 +262,14 @@ impl<S: Softness> ColourRenderer<S> {
     /// to read them back, which is impossible in a browser.
     ///
     /// ```
-    /// use softrast_raster::{Attributes, ColourRenderer, HostBackend, Projected, vertices};
+    /// use softrast_raster::{Attributes, ColourRenderer, HostBackend, Projected, vertex_tensor};
     /// use softrast_softness::{DepthSoftness, Family};
     /// use softrast_tensor::{Autodiff, vector};
     ///
     /// let (faces, device) = ([[0, 1, 2]], Default::default());
     /// let corners = [[-0.5, -0.5, 2.0], [0.5, -0.5, 2.0], [0.0, 0.5, 2.0]];
-    /// let corners = Projected::new(vertices::<Autodiff<HostBackend>>(&corners, &device));
-    /// let white = Attributes::of_vertices(vertices(&[[1.0; 3]; 3], &device), &faces);
+    /// let corners = Projected::new(vertex_tensor::<Autodiff<HostBackend>>(&corners, &device));
+    /// let white = Attributes::of_vertices(vertex_tensor(&[[1.0; 3]; 3], &device), &faces);
     /// let renderer = ColourRenderer::new(&faces, 8, Family::Logistic, 0.05, [1.0, 3.0])
     ///     .with_depth(DepthSoftness::Family(Family::Logistic), 0.2);
     /// let [edge, depth] = renderer.phi().each_ref().map(|phi| vector(phi).require_grad());

@@ -102,11 +102,11 @@ pub(crate) fn hard_coverage_of<B: Backend>(
 /// Source: docs/notes.md, Colour.
 ///
 /// ```
-/// use softrast_raster::{HostBackend, Projected, nearest_faces, vertices};
+/// use softrast_raster::{HostBackend, Projected, nearest_faces, vertex_tensor};
 ///
 /// // The second face is in front of the first.
 /// let corner = |depth: f64| [[-2.0, -2.0, depth], [2.0, -2.0, depth], [0.0, 4.0, depth]];
-/// let corners = vertices::<HostBackend>(&[corner(2.0), corner(1.0)].concat(), &Default::default());
+/// let corners = vertex_tensor::<HostBackend>(&[corner(2.0), corner(1.0)].concat(), &Default::default());
 /// assert_eq!(nearest_faces(Projected::new(corners), &[[0, 1, 2], [3, 4, 5]], 1), [Some(1)]);
 /// ```
 ///

@@ -22,12 +22,12 @@
 //! # Example: a sharp image with a wide gradient
 //!
 //! ```
-//! use softrast_raster::{HostBackend, Projected, SoftRenderer, vertices};
+//! use softrast_raster::{HostBackend, Projected, SoftRenderer, vertex_tensor};
 //! use softrast_softness::Family;
 //! use softrast_tensor::{Autodiff, numbers};
 //!
 //! let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
-//! let corners = vertices::<Autodiff<HostBackend>>(&corners, &Default::default()).require_grad();
+//! let corners = vertex_tensor::<Autodiff<HostBackend>>(&corners, &Default::default()).require_grad();
 //! let sharp = SoftRenderer::new(&[[0, 1, 2]], 8, Family::Logistic, 1e-4).without_back_faces();
 //! let surrogate = sharp.clone().with_surrogate(Family::Logistic, 0.1);
 //! let [(image, gradient), (same, wide)] = [sharp, surrogate].map(|renderer| {
@@ -78,7 +78,7 @@ mod width;
 pub use attributes::Attributes;
 pub use backend::RasterBackend;
 pub use backend_choice::{BackendChoice, HostBackend, NoBackend};
-pub use camera::{Orbit, vertices};
+pub use camera::{Orbit, vertex_tensor};
 pub use colour::{Background, blend, hard_colour, nearness};
 pub use colour_renderer::ColourRenderer;
 #[cfg(feature = "wgpu")]
@@ -110,7 +110,7 @@ pub use width::{Width, WidthSchedule};
 ///
 /// ```
 /// use softrast_raster::low_level::{FusedOp, Numbers, Pass, Profile, Rasterizer, Silhouette, profile_sum};
-/// use softrast_raster::{HostBackend, vertices};
+/// use softrast_raster::{HostBackend, vertex_tensor};
 /// use softrast_softness::{EdgeSoftness, Family, Softness};
 /// use softrast_tensor::vector;
 ///
@@ -124,7 +124,7 @@ pub use width::{Width, WidthSchedule};
 /// let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
 /// let (op, table) = (silhouette.op(), silhouette.table(phi));
 /// let FusedOp::ProfileSum(sum) = &op else { unreachable!() };
-/// let sums = profile_sum(sum, vertices::<HostBackend>(&corners, &Default::default()), table.clone());
+/// let sums = profile_sum(sum, vertex_tensor::<HostBackend>(&corners, &Default::default()), table.clone());
 /// let table: Vec<f32> = table.into_data().iter().collect();
 /// let axes: Vec<f32> = (0..9).map(|k| corners[k % 3][k / 3] as f32).collect();
 /// let dims = [vec![1, 3, 3], vec![table.len() / 4, 4]];

@@ -21,11 +21,11 @@ const ROUNDED: f64 = 1e-3;
 ///
 /// ```
 /// # use softrast_tensor::NdArray;
-/// use softrast_raster::{Pinhole, Pinholes, project, vertices};
+/// use softrast_raster::{Pinhole, Pinholes, project, vertex_tensor};
 ///
 /// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, [150, 200]);
 /// let device = Default::default();
-/// let corners = vertices::<NdArray>(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], &device);
+/// let corners = vertex_tensor::<NdArray>(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], &device);
 /// let seen = project(corners, Pinholes::new(&[camera], &device)).tensor(); // [1, 2, 3]
 /// let x: Vec<f32> = seen.into_data().to_vec().unwrap();
 /// assert!(x[0].abs() < 1e-6 && x[3] > 0.0, "the origin is in the middle, +x to the right");

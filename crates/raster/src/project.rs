@@ -13,7 +13,7 @@ use crate::{
 /// all of these tensors.
 ///
 /// ```
-/// use softrast_raster::{Cameras, HostBackend, RasterBackend, project, vertices};
+/// use softrast_raster::{Cameras, HostBackend, RasterBackend, project, vertex_tensor};
 /// use softrast_tensor::{Tensor, numbers, tensor};
 ///
 /// /// A camera at the origin that looks along z, with this focal length in NDC.
@@ -24,7 +24,7 @@ use crate::{
 ///         tensor(vec![self.0, 0.0, 0.0, 0.0, 0.0, self.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0], [1, 3, 4])
 ///     }
 /// }
-/// let point = vertices::<HostBackend>(&[[0.5, 0.0, 2.0]], &Default::default());
+/// let point = vertex_tensor::<HostBackend>(&[[0.5, 0.0, 2.0]], &Default::default());
 /// assert_eq!(numbers(project(point, Ahead(3.0)).tensor()), [0.75, 0.0, 2.0]);
 /// ```
 #[diagnostic::on_unimplemented(

@@ -11,10 +11,10 @@ const MARGIN: f64 = 0.05;
 ///
 /// ```compile_fail
 /// use softrast_tensor::NdArray;
-/// use softrast_raster::{SoftRenderer, vertices};
+/// use softrast_raster::{SoftRenderer, vertex_tensor};
 /// use softrast_softness::Family;
 ///
-/// let world = vertices::<NdArray>(&[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &Default::default());
+/// let world = vertex_tensor::<NdArray>(&[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &Default::default());
 /// SoftRenderer::new(&[[0, 1, 2]], 32, Family::Logistic, 0.01).silhouette(world);
 /// ```
 #[derive(Clone, Debug)]

@@ -22,11 +22,11 @@ use crate::{
 ///
 /// ```
 /// use softrast_tensor::{Autodiff, NdArray};
-/// use softrast_raster::{Orbit, SoftRenderer, project, vertices};
+/// use softrast_raster::{Orbit, SoftRenderer, project, vertex_tensor};
 /// use softrast_softness::Family;
 ///
 /// let device = Default::default();
-/// let corners = vertices::<Autodiff<NdArray>>(&[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &device);
+/// let corners = vertex_tensor::<Autodiff<NdArray>>(&[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &device);
 /// let camera = Orbit { distance: 3.0, elevation_deg: 0.0, azimuth_deg: 20.0, fov_deg: 60.0 }.tensor(&device).require_grad();
 /// let renderer = SoftRenderer::new(&[[0, 1, 2]], 32, Family::Logistic, 0.01);
 /// let alpha = renderer.silhouette(project(corners, camera.clone())); // [1, 32, 32]
@@ -89,11 +89,11 @@ impl<S: Softness> SoftRenderer<S> {
     ///
     /// ```
     /// use softrast_tensor::NdArray;
-    /// use softrast_raster::{Projected, SoftRenderer, vertices};
+    /// use softrast_raster::{Projected, SoftRenderer, vertex_tensor};
     /// use softrast_softness::Family;
     ///
     /// let corners = [[-0.5, -0.5, 2.0], [0.5, -0.5, 2.0], [0.5, 0.5, 2.0], [-0.5, 0.5, 2.0]];
-    /// let corners = vertices::<NdArray>(&corners, &Default::default());
+    /// let corners = vertex_tensor::<NdArray>(&corners, &Default::default());
     /// let one = SoftRenderer::new(&[[0, 1, 2]], 32, Family::Gauss, 0.01);
     /// let two = one.with_faces([[0, 1, 2], [0, 2, 3]]);
     /// let [half, whole] = [one, two].map(|r| r.silhouette(Projected::new(corners.clone())).mean().into_scalar());

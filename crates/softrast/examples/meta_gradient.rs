@@ -11,7 +11,7 @@ type Inner = Autodiff<Outer>; // differentiable twice
 fn main() {
     let (mesh, device) = (fox(), Default::default());
     let camera = Orbit { distance: 2.7, elevation_deg: 10.0, azimuth_deg: 0.0, fov_deg: 60.0 };
-    let seen = project::<Inner>(vertices(mesh.positions(), &device), camera.tensor(&device));
+    let seen = project::<Inner>(vertex_tensor(mesh.positions(), &device), camera.tensor(&device));
     let target = hard_silhouette(seen, mesh.faces(), 32);
     let renderer = SoftRenderer::new(mesh.faces(), 32, Family::Logistic, 0.02);
     let phi = renderer.phi_tensor::<Outer>(&device).require_grad();
@@ -22,7 +22,7 @@ fn main() {
     for step in 0..10 {
         // One level further in: its gradient is an ordinary tensor of `Outer`, tracked back to `phi`.
         let leaf = Tensor::<Inner, 2>::from_inner(pose.clone()).require_grad();
-        let corners = project(vertices(mesh.positions(), &device), leaf.clone());
+        let corners = project(vertex_tensor(mesh.positions(), &device), leaf.clone());
         let image = renderer.silhouette_with(corners, &Tensor::from_inner(phi.clone()));
         let loss = iou_loss(image, target.clone()).mean();
         println!("step {step}: IoU loss {:.4}", loss.clone().into_scalar());

@@ -18,7 +18,7 @@ fn main() {
     let (fox, device) = (mesh::fox(), Default::default());
     let front = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 0.0, fov_deg: 60.0 };
     let cameras = Orbit::tensors::<Autodiff<NdArray>>(&front.around(12), &device);
-    let seen = project(vertices(fox.positions(), &device), cameras.clone());
+    let seen = project(vertex_tensor(fox.positions(), &device), cameras.clone());
     let masks = hard_silhouette(seen, fox.faces(), [90, 120]);
     let mut shape = VertexModel::new(&mesh::icosphere(3), &device);
     let width = Width::pixels(1.0).to(0.1);

@@ -9,7 +9,7 @@ fn main() -> anyhow::Result<()> {
 
     // A mask, here drawn from a known pose. For your own: Picture::load_mask("mask.png")?
     let truth = Pinhole::look_at([2.0, 1.5, -2.5], [0.0; 3], [0.0, 1.0, 0.0], 45.0, [90, 120]);
-    let corners = vertices::<NdArray>(mesh.positions(), &device);
+    let corners = vertex_tensor::<NdArray>(mesh.positions(), &device);
     let seen = project(corners, Pinholes::new(&[truth], &device));
     let file = std::env::temp_dir().join(format!("softrast-mask-{}.png", std::process::id()));
     save_picture(hard_silhouette(seen, mesh.faces(), [90, 120]), &file)?;

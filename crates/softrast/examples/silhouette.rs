@@ -13,7 +13,7 @@ type B = Autodiff<NdArray>;
 fn main() {
     let device = Default::default();
     let mesh = fox(); // or Mesh::load("my.obj")?
-    let corners = vertices::<B>(mesh.positions(), &device).require_grad(); // [1, V, 3]
+    let corners = vertex_tensor::<B>(mesh.positions(), &device).require_grad(); // [1, V, 3]
     let camera = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 60.0 };
     let camera = camera.tensor::<B>(&device).require_grad(); // [1, 4]
     let renderer = SoftRenderer::new(mesh.faces(), 64, Family::Logistic, 0.01);

@@ -11,7 +11,7 @@ type B = Autodiff<NdArray>;
 fn main() {
     let (fox, device) = (fox(), Default::default());
     let front = Orbit { distance: 2.7, elevation_deg: 15.0, azimuth_deg: 0.0, fov_deg: 60.0 };
-    let world = vertices::<B>(fox.positions(), &device);
+    let world = vertex_tensor::<B>(fox.positions(), &device);
     let seen = project(world.clone(), Orbit::tensors(&front.around(6), &device));
     let renderer = ColourRenderer::new(fox.faces(), 64, Family::Logistic, 0.005, seen.planes());
     let [towards, colour] = [[0.5, 1.0, -0.5], [1.0; 3]].map(|x| Tensor::from_floats(x, &device));

@@ -15,7 +15,7 @@
 //! let front = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 0.0, fov_deg: 60.0 };
 //! let cameras = Orbit::tensors::<B>(&front.around(3), &device).require_grad(); // [3, 4]
 //! let renderer = SoftRenderer::new(fox.faces(), [24, 32], Family::Gauss, Width::pixels(1.0));
-//! let image = renderer.silhouette(project(vertices(fox.positions(), &device), cameras.clone()));
+//! let image = renderer.silhouette(project(vertex_tensor(fox.positions(), &device), cameras.clone()));
 //! assert_eq!(image.dims(), [3, 24, 32]);
 //! let by_cameras = cameras.grad(&image.mean().backward()).unwrap();
 //! assert_eq!(by_cameras.dims(), [3, 4]);
@@ -35,7 +35,7 @@
 //! # let (fox, device) = (fox(), Default::default());
 //! # let front = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 0.0, fov_deg: 60.0 };
 //! let cameras = Orbit::tensors::<B>(&front.around(3), &device); // or views.cameras(&device)
-//! let seen = project(vertices(fox.positions(), &device), cameras.clone());
+//! let seen = project(vertex_tensor(fox.positions(), &device), cameras.clone());
 //! let masks = hard_silhouette(seen, fox.faces(), [24, 32]); // or views.masks(&device)
 //!
 //! let mut shape = VertexModel::new(&icosphere(2), &device);

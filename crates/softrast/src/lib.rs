@@ -31,7 +31,7 @@
 //! let camera = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 60.0 };
 //! let camera = camera.tensor::<Autodiff<NdArray>>(&device).require_grad();
 //! let renderer = SoftRenderer::new(mesh.faces(), 64, Family::Logistic, 0.01);
-//! let seen = project(vertices(mesh.positions(), &device), camera.clone());
+//! let seen = project(vertex_tensor(mesh.positions(), &device), camera.clone());
 //! let alpha = renderer.silhouette(seen);
 //! assert_eq!(alpha.dims(), [1, 64, 64]);
 //! let gradient = camera.grad(&alpha.mean().backward()).unwrap();

@@ -13,7 +13,7 @@ pub use softrast_meta::MetaGradient;
 pub use softrast_raster::{
     Attributes, Background, Cameras, ColourRenderer, Orbit, Pinhole, Pinholes, Projected,
     RasterBackend, SoftRenderer, TConorm, Weighting, Width, hard_silhouette, iou_loss, mse_loss,
-    project, vertices,
+    project, vertex_tensor,
 };
 pub use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, Truncated};
 pub use softrast_tensor::{Backend, Tensor};

@@ -140,7 +140,7 @@ fn after_ten_steps(renderer: &SoftRenderer<Family>, h: f64) -> f64 {
     type Exact = NdArray<f64>;
     let (mesh, device) = (fox(), Default::default());
     let camera = Orbit { distance: 2.7, elevation_deg: 10.0, azimuth_deg: 0.0, fov_deg: 60.0 };
-    let seen = project(vertices::<Exact>(mesh.positions(), &device), camera.tensor(&device));
+    let seen = project(vertex_tensor::<Exact>(mesh.positions(), &device), camera.tensor(&device));
     let target = hard_silhouette(seen, mesh.faces(), 32);
     let phi = renderer.phi_tensor::<Exact>(&device) + h;
     let start = Orbit { elevation_deg: 22.0, azimuth_deg: 15.0, ..camera };
@@ -148,7 +148,7 @@ fn after_ten_steps(renderer: &SoftRenderer<Family>, h: f64) -> f64 {
     let (mut pose, rates) = (start.tensor::<Exact>(&device), rates.tensor::<Exact>(&device));
     for _ in 0..10 {
         let leaf = Tensor::<Autodiff<Exact>, 2>::from_inner(pose.clone()).require_grad();
-        let corners = project(vertices(mesh.positions(), &device), leaf.clone());
+        let corners = project(vertex_tensor(mesh.positions(), &device), leaf.clone());
         let image = renderer.silhouette_with(corners, &Tensor::from_inner(phi.clone()));
         let loss = iou_loss(image, Tensor::from_inner(target.clone())).mean();
         let gradient = leaf.grad(&loss.backward()).expect("the image depends on the pose");

@@ -2,7 +2,7 @@ use softrast_inverse::{PaintTargets, SolveConfig, paint};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_meta::Objective;
 use softrast_raster::{
-    Attributes, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend, project, vertices,
+    Attributes, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend, project, vertex_tensor,
 };
 use softrast_softness::Family;
 use softrast_tensor::Tensor;
@@ -120,7 +120,7 @@ impl<B: RasterBackend> Objective<B> for Painted {
             .iter()
             .map(|(v, [x, y, extent])| v.view.camera.cropped([*x, *y], [*extent; 2], SIZE))
             .collect();
-        let moved = vertices::<B>(self.mesh.positions(), &device) + part(3 * count);
+        let moved = vertex_tensor::<B>(self.mesh.positions(), &device) + part(3 * count);
         let seen = project(moved, Pinholes::new(&cameras, &device));
         let renderer =
             ColourRenderer::new(self.mesh.faces(), SIZE, Family::Logistic, 0.05, [1.5, 4.5]);

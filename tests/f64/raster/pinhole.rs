@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use softrast_raster::{
-    Orbit, Pinhole, PinholeError, Pinholes, PyTorch3dCamera, project, rotate_by_tangent, vertices,
+    Orbit, Pinhole, PinholeError, Pinholes, PyTorch3dCamera, project, rotate_by_tangent,
+    vertex_tensor,
 };
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::numbers;
@@ -41,7 +42,7 @@ fn a_point_is_in_the_pixel_that_was_worked_out_by_hand() {
     let (camera, point) = (worked(), [1.0, 2.0, 3.0]);
     assert_close(&camera.pixel(point), &[258.5, -22.75, 5.0], 1e-12);
     let device = Default::default();
-    let seen = project(vertices::<B>(&[point], &device), Pinholes::new(&[camera], &device));
+    let seen = project(vertex_tensor::<B>(&[point], &device), Pinholes::new(&[camera], &device));
     // A pixel is 2 / 150 wide; the middle of the image is at (100, 75).
     let expected = [(258.5 - 100.0) / 75.0, (75.0 + 22.75) / 75.0, 5.0];
     assert_close(&numbers(seen.tensor()), &expected, 1e-12);
@@ -208,7 +209,7 @@ proptest! {
         let camera = Pinhole::from_orbit(&orbit, size);
         prop_assert_eq!(camera.check(), Ok(()));
         let device = Default::default();
-        let vertices = vertices::<B>(&[vertex], &device);
+        let vertices = vertex_tensor::<B>(&[vertex], &device);
         let expected = numbers(project(vertices.clone(), orbit.tensor(&device)).tensor());
         let cameras = Pinholes::new(&[camera], &device);
         assert_close(&numbers(project(vertices.clone(), &cameras).tensor()), &expected, 1e-9);

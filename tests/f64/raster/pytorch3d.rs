@@ -5,7 +5,7 @@
 
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::{
-    Orbit, Pinhole, Pinholes, Projected, PyTorch3dCamera, SoftRenderer, project, vertices,
+    Orbit, Pinhole, Pinholes, Projected, PyTorch3dCamera, SoftRenderer, project, vertex_tensor,
 };
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{NdArray, Tensor};
@@ -115,7 +115,7 @@ fn a_silhouette_with_the_translated_scale_and_camera_is_that_of_pytorch3d() {
     let (focal_length, principal_point) = ([focal(); 2], [0.0; 2]);
     let camera = PyTorch3dCamera { r, t, focal_length, principal_point };
     let camera = Pinhole::from_pytorch3d(&camera, SIZE);
-    let corners = vertices::<B>(mesh.positions(), &device);
+    let corners = vertex_tensor::<B>(mesh.positions(), &device);
     let seen = project(corners, Pinholes::new(&[camera], &device));
     assert_same(&ours(&mesh, seen.tensor()), &theirs);
 }
@@ -126,7 +126,7 @@ fn an_orbit_shows_the_same() {
     let azimuth_deg = 180.0 - 35.0;
     let orbit = Orbit { distance: 3.0, elevation_deg: 20.0, azimuth_deg, fov_deg: FOV_DEG };
     let device = Default::default();
-    let seen = project(vertices::<B>(mesh.positions(), &device), orbit.tensor(&device));
+    let seen = project(vertex_tensor::<B>(mesh.positions(), &device), orbit.tensor(&device));
     assert_same(&ours(&mesh, seen.tensor()), &theirs(&mesh, f64::INFINITY));
 }
 
@@ -136,7 +136,7 @@ fn clip_space_of_opengl_over_its_w_is_what_we_draw() {
     // PyTorch3D's left is reversed in OpenGL; w is the depth ahead.
     let clip = seen(&mesh).into_iter().map(|[x, y, z]| [-focal() * x, focal() * y, z]);
     let over_w: Vec<[f64; 3]> = clip.map(|[x, y, w]| [x / w, y / w, w]).collect();
-    let image = ours(&mesh, vertices::<B>(&over_w, &Default::default()));
+    let image = ours(&mesh, vertex_tensor::<B>(&over_w, &Default::default()));
     assert_same(&image, &theirs(&mesh, f64::INFINITY));
 }
 

@@ -36,11 +36,18 @@ class Renderer:
             "faces": _shapes.faces(faces), "size": _shapes.size(size), "softness": softness, "progress": progress, "tolerance": tolerance,
             "t_conorm": t_conorm, "cull_back_faces": cull_back_faces,
         }
-        self._native = _native.Renderer(*self._settings.values())
+        self._draw_by(_native.Renderer(*self._settings.values()))
+
+    def _draw_by(self, native: _native.Renderer) -> None:
+        self._native = native
         # Plain attributes: torch.compile reads no others.
         self._least, self._parameters = self._native.least_vertices, len(self._native.phi)
         self._by_own, self._by_phi = (_passes.silhouette(self._native, own) for own in (True, False))
         self._by_own_name, self._by_phi_name = self._by_own.handle, self._by_phi.handle
+
+    def with_faces(self, faces: ArrayLike) -> Renderer:
+        """This renderer for other `faces` `[F, 3]`. It keeps knots and tables, so a mesh that is remeshed every few steps need not choose them again."""
+        return _with_faces(self, faces)
 
     @property
     def faces(self) -> NDArray[np.int64]:
@@ -98,7 +105,10 @@ class ColourRenderer:
             "faces": _shapes.faces(faces), "size": _shapes.size(size), "softness": softness, "planes": _shapes.planes(planes),
             "progress": progress, "depth": depth, "depth_scale": depth_scale, "tolerance": tolerance, "cull_back_faces": cull_back_faces,
         }
-        self._native = _native.ColourRenderer(*self._settings.values())
+        self._draw_by(_native.ColourRenderer(*self._settings.values()))
+
+    def _draw_by(self, native: _native.ColourRenderer) -> None:
+        self._native = native
         # Plain attributes: torch.compile reads no others.
         self._least, self._log_weight = self._native.least_vertices, self._native.log_weight
         self._phi = tuple(map(float, self._native.phi)), tuple(map(float, self._native.phi_depth))
@@ -111,6 +121,10 @@ class ColourRenderer:
         if key not in self._functions:
             self._functions[key] = _passes.blend(self._native, corners, texture)
         return self._functions[key]
+
+    def with_faces(self, faces: ArrayLike) -> ColourRenderer:
+        """This renderer for other `faces` `[F, 3]`, with its knots and tables, as `Renderer.with_faces`."""
+        return _with_faces(self, faces)
 
     @property
     def phi(self) -> NDArray[np.float64]:
@@ -155,6 +169,13 @@ class ColourRenderer:
 
     def __reduce__(self) -> Tuple[Any, ...]:
         return _made, (type(self), self._settings)
+
+
+def _with_faces(renderer: Any, faces: ArrayLike) -> Any:
+    other = object.__new__(type(renderer))
+    other._settings = {**renderer._settings, "faces": _shapes.faces(faces)}
+    other._draw_by(renderer._native.with_faces(other._settings["faces"]))
+    return other
 
 
 def _made(kind: Any, settings: Dict[str, Any]) -> Any:

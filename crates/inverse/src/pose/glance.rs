@@ -2,7 +2,7 @@ use std::borrow::Cow;
 
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, Projected, hard_silhouette, iou_loss, project, vertices,
+    HostBackend, Pinhole, Pinholes, Projected, hard_silhouette, iou_loss, project, vertex_tensor,
 };
 use softrast_tensor::{Tensor, numbers, tensor};
 
@@ -65,7 +65,7 @@ impl<'a> Look<'a> {
             let coat = VertexColours::new(colours, mesh.faces().into());
             ColouredViews::of_pictures(coat, &[(view, square); AT_ONCE], COARSE_SIDE)
         });
-        let corners = vertices(mesh.positions(), &Default::default());
+        let corners = vertex_tensor(mesh.positions(), &Default::default());
         Self { mesh, corners, middle, radius, camera, square, levels, covered, white, colours }
     }
 

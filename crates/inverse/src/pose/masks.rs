@@ -4,7 +4,7 @@ use anyhow::Context;
 use softrast_mesh::Mesh;
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, Projected, RasterBackend, hard_silhouette, project,
-    rotate_by_tangent, vertices,
+    rotate_by_tangent, vertex_tensor,
 };
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
@@ -216,7 +216,7 @@ impl<B: RasterBackend> MaskScene<B> {
             ColouredViews::of_pictures(coat, &painted, size)
         });
         Self {
-            vertices: vertices(mesh.positions(), &device),
+            vertices: vertex_tensor(mesh.positions(), &device),
             faces: mesh.faces().into(),
             cameras: Pinholes::new(&cameras, &device),
             seen: tensor(at.collect(), [views, 2]),

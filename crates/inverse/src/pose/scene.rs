@@ -2,7 +2,8 @@ use std::sync::Arc;
 
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Orbit, Projected, RasterBackend, hard_silhouette, project, vertices, view_rotation,
+    HostBackend, Orbit, Projected, RasterBackend, hard_silhouette, project, vertex_tensor,
+    view_rotation,
 };
 use softrast_tensor::{Tensor, numbers, tensor};
 
@@ -144,7 +145,7 @@ impl<B: RasterBackend> PoseScene<B> {
 fn seen_by<B: RasterBackend>(mesh: &Mesh, cameras: &[Orbit], size: usize) -> [Tensor<B, 3>; 2] {
     let (views, count, device) = (cameras.len(), mesh.positions().len(), Default::default());
     let cameras = Orbit::tensors::<B>(cameras, &device);
-    let positions = vertices::<B>(mesh.positions(), &device);
+    let positions = vertex_tensor::<B>(mesh.positions(), &device);
     let seen = project(positions.clone(), cameras.clone());
     let silhouettes = hard_silhouette(seen, mesh.faces(), size);
     let angle = |k: usize| cameras.clone().narrow(1, k, 1).reshape([views]);

@@ -1,7 +1,7 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use softrast_raster::{
-    Attributes, ColourRenderer, Projected, RasterBackend, Weighting, nearest_faces, vertices,
+    Attributes, ColourRenderer, Projected, RasterBackend, Weighting, nearest_faces, vertex_tensor,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Tensor, TensorData, numbers};
@@ -22,12 +22,12 @@ const TOLERANCE: f64 = 1e-3;
 ///
 /// ```
 /// use softrast_inverse::pose::{ColouredViews, VertexColours};
-/// use softrast_raster::{HostBackend, Projected, vertices};
+/// use softrast_raster::{HostBackend, Projected, vertex_tensor};
 /// use softrast_tensor::{Tensor, numbers};
 ///
 /// // A red face over the whole image is its own target.
 /// let corners = [[-9.0, -9.0, 2.0], [9.0, -9.0, 2.0], [0.0, 9.0, 2.0]];
-/// let seen = Projected::new(vertices::<HostBackend>(&corners, &Default::default()));
+/// let seen = Projected::new(vertex_tensor::<HostBackend>(&corners, &Default::default()));
 /// let coat = VertexColours::new(&[[1.0, 0.0, 0.0]; 3], [[0, 1, 2]].into());
 /// let red = coat.hard(seen, 4);
 /// let views = ColouredViews::new(coat, red.clone(), Tensor::ones([1, 4, 4], &Default::default()));
@@ -50,7 +50,7 @@ impl<B: RasterBackend> VertexColours<B> {
     ///
     /// If a face has a vertex without a colour.
     pub fn new(colours: &[[f64; 3]], faces: Arc<[[u32; 3]]>) -> Self {
-        let values = vertices(colours, &Default::default());
+        let values = vertex_tensor(colours, &Default::default());
         Self {
             colours: colours.to_vec(),
             attributes: Attributes::new(values, faces.clone()),

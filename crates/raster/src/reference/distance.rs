@@ -13,11 +13,11 @@ const ON_EDGE: f64 = 1e-24;
 /// outside; the distance is that to the nearest point of the boundary. Edges belong to the inside; a face without area has none.
 ///
 /// ```
-/// use softrast_raster::{HostBackend, reference::signed_distance, vertices};
+/// use softrast_raster::{HostBackend, reference::signed_distance, vertex_tensor};
 /// use softrast_tensor::{numbers, tensor};
 ///
 /// let corners = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
-/// let corners = vertices::<HostBackend>(&corners, &Default::default());
+/// let corners = vertex_tensor::<HostBackend>(&corners, &Default::default());
 /// let pixels = tensor(vec![0.25, 0.25, 0.5, -0.5], [2, 2]);
 /// assert_eq!(numbers(signed_distance(corners, &[[0, 1, 2]], pixels)), [0.25, -0.5]);
 /// ```

@@ -3,14 +3,14 @@
 //! Slow (about 1.3 kB of memory traffic per pair) and simple; every faster implementation is tested against it.
 //!
 //! ```
-//! use softrast_raster::{HostBackend, Projected, SoftRenderer, TConorm, vertices};
+//! use softrast_raster::{HostBackend, Projected, SoftRenderer, TConorm, vertex_tensor};
 //! use softrast_raster::reference::{Scene, sums};
 //! use softrast_softness::Family;
 //! use softrast_tensor::numbers;
 //!
 //! let (faces, device) = ([[0, 1, 2]], Default::default());
 //! let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
-//! let corners = vertices::<HostBackend>(&corners, &device);
+//! let corners = vertex_tensor::<HostBackend>(&corners, &device);
 //! let renderer = SoftRenderer::new(&faces, 8, Family::Logistic, 0.02);
 //! let scene = Scene { faces: &faces, size: 8.into() };
 //! let t_conorm = TConorm::Probabilistic;

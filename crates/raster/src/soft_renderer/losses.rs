@@ -40,13 +40,13 @@ impl<S: Softness> SoftRenderer<S> {
     /// weights, every pixel counts in full.
     ///
     /// ```
-    /// use softrast_raster::{HostBackend, Projected, SoftRenderer, vertices};
+    /// use softrast_raster::{HostBackend, Projected, SoftRenderer, vertex_tensor};
     /// use softrast_softness::Family;
     /// use softrast_tensor::{Tensor, numbers};
     ///
     /// let device = Default::default();
     /// let corners = [[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]];
-    /// let corners = Projected::new(vertices::<HostBackend>(&corners, &device));
+    /// let corners = Projected::new(vertex_tensor::<HostBackend>(&corners, &device));
     /// let renderer = SoftRenderer::new(&[[0, 1, 2]], 8, Family::Logistic, 0.02);
     /// // Weights of 0 leave an empty image.
     /// let full = |x: f64| Tensor::full([1, 8, 8], x, &device);

@@ -3,7 +3,7 @@
 use std::{fs, process::Command, thread, time::Duration};
 
 use softrast_mesh::icosphere;
-use softrast_raster::{Orbit, RasterBackend, SoftRenderer, project, vertices};
+use softrast_raster::{Orbit, RasterBackend, SoftRenderer, project, vertex_tensor};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{Autodiff, Tensor};
 
@@ -24,7 +24,7 @@ fn step<T: RasterBackend>(
 ) {
     let device = Default::default();
     let ball = icosphere(2);
-    let points = vertices::<Autodiff<T>>(ball.positions(), &device);
+    let points = vertex_tensor::<Autodiff<T>>(ball.positions(), &device);
     let orbit =
         |azimuth_deg| Orbit { distance: 2.7, elevation_deg: 17.0, azimuth_deg, fov_deg: 60.0 };
     let orbits = Orbit::tensors::<Autodiff<T>>(&[4.0, 108.0, 211.0].map(orbit), &device);

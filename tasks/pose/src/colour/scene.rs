@@ -2,7 +2,7 @@ use softrast_inverse::{
     PoseProblem, SoftnessAt,
     pose::{ColouredViews, PoseInstance, PoseScene, VertexColours, split_coverage},
 };
-use softrast_raster::{Orbit, Projected, RasterBackend, project, vertices};
+use softrast_raster::{Orbit, Projected, RasterBackend, project, vertex_tensor};
 use softrast_softness::Softness;
 use softrast_tensor::Tensor;
 
@@ -32,7 +32,7 @@ impl<B: RasterBackend> Scene<B> {
         let coat = VertexColours::new(colours, mesh.faces().into());
         let device = Default::default();
         let cameras: Vec<Orbit> = instances.iter().map(|instance| instance.target).collect();
-        let world = vertices::<B>(mesh.positions(), &device);
+        let world = vertex_tensor::<B>(mesh.positions(), &device);
         let target = coat.hard(project(world, Orbit::tensors(&cameras, &device)), size);
         let colours = ColouredViews::new(coat, target, silhouettes.target());
         Self { silhouettes, colours }
