@@ -1,4 +1,4 @@
-"""A step of an optimisation, float32: projection, image, mean squared difference, gradient to the vertices.
+"""A step of an optimisation, float32: projection, image, mean squared difference by `st.mse_loss`, gradient to the vertices.
 
 `python bindings/python/benches/steps.py [--mesh W2_MESH.obj] [--rust target/release/examples/step]`, in an environment with the wheel and torch.
 
@@ -64,7 +64,7 @@ target = torch.zeros(VIEWS, SIZE, SIZE)
 
 
 def loss(vertices):
-    return (st.silhouette(renderer, st.project(vertices, cameras)) - target).pow(2).mean()
+    return st.mse_loss(st.silhouette(renderer, st.project(vertices, cameras)), target).mean()
 
 
 def ours():

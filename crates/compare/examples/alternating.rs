@@ -32,8 +32,8 @@ const TRAINING: u64 = 6;
 
 fn main() -> anyhow::Result<()> {
     let study = Study::parse();
-    let head = ["task", "softness", "seeds", "stays", "adapts, at its rate", "adapts less stays"];
-    let mut table = Table::new(head.into_iter().chain(["`preset`", "adapts less `preset`"]));
+    let head = ["task", "softness", "seeds", "fixed φ", "adapting, at its rate", "adapting − fixed"];
+    let mut table = Table::new(head.into_iter().chain(["`preset`", "adapting − `preset`"]));
     rows::<Pose>(&mut table, 48, &study)?;
     rows::<Occlusion>(&mut table, 50, &study)?;
     rows::<Shape3d>(&mut table, 12, &study)?;

@@ -20,13 +20,14 @@ _NAMES = ("orbit_matrix", "project", "silhouette", "blend", "mse_loss", "iou_los
 _SCHEMA = "(Tensor[] tensors, str function, str along, str wanted) -> Tensor[]"
 # Older versions draw and differentiate in eager mode, without torch.func and torch.compile.
 _COMPILES = hasattr(torch.library, "register_vmap")
+_transformed = getattr(torch._C, "_are_functorch_transforms_active", lambda: True)
 
 
 def value(kind, name, inputs):
     """The value and what is kept, of the function `name` of a kind such as "silhouette"."""
     if _COMPILES and torch.compiler.is_compiling():
         return getattr(torch.ops.softrast, kind)(inputs, name, "", "")
-    return _Value.apply(name, *inputs)
+    return _eager("", name, inputs, [], [])
 
 
 def jvp(kind, name, inputs, kept, directions):
@@ -35,7 +36,7 @@ def jvp(kind, name, inputs, kept, directions):
     tensors = [*inputs, *kept, *(direction for direction in directions if direction is not None)]
     if _COMPILES and torch.compiler.is_compiling():
         return getattr(torch.ops.softrast, kind + "_jvp")(tensors, name, _flags(along), "")[0]
-    return _Jvp.apply(name, along, *tensors)[0]
+    return _eager("_jvp", name, tensors, along, [])[0]
 
 
 def vjp(kind, name, inputs, kept, upstream, wanted):
@@ -43,7 +44,7 @@ def vjp(kind, name, inputs, kept, upstream, wanted):
     tensors = [*inputs, *kept, upstream]
     if _COMPILES and torch.compiler.is_compiling():
         return getattr(torch.ops.softrast, kind + "_vjp")(tensors, name, "", _flags(wanted))
-    return _Vjp.apply(name, wanted, *tensors)
+    return _eager("_vjp", name, tensors, [], wanted)
 
 
 def vjp_of_vjp(kind, name, inputs, kept, upstream, directions, wanted):
@@ -52,7 +53,7 @@ def vjp_of_vjp(kind, name, inputs, kept, upstream, directions, wanted):
     tensors = [*inputs, *kept, upstream, *(direction for direction in directions if direction is not None)]
     if _COMPILES and torch.compiler.is_compiling():
         return getattr(torch.ops.softrast, kind + "_vjp_of_vjp")(tensors, name, _flags(along), _flags(wanted))
-    return _VjpOfVjp.apply(name, along, wanted, *tensors)
+    return _eager("_vjp_of_vjp", name, tensors, along, wanted)
 
 
 def _flags(which):
@@ -114,9 +115,16 @@ def _jvp_back(call, name, saved, needed, along, upstream):
 
 
 def _eager(order, name, tensors, along, wanted):
-    if order == "_vjp":
-        return _Vjp.apply(name, wanted, *tensors)
-    return _VjpOfVjp.apply(name, [bool(moves) for moves in along], wanted, *tensors)
+    transformed, along = _transformed(), [bool(moves) for moves in along]
+    # An autograd function takes a quarter of a millisecond, even where nothing is recorded: as a rule on the way back, and for cameras.
+    recorded = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in tensors)
+    if not (transformed or recorded or torch.autograd.forward_ad._current_level >= 0):
+        return _computed(order, name, tensors, along, wanted)
+    kind = {"": _Value, "_vjp": _Vjp, "_jvp": _Jvp, "_vjp_of_vjp": _VjpOfVjp}[order]
+    flags = {"": (), "_vjp": (wanted,), "_jvp": (along,), "_vjp_of_vjp": (along, wanted)}[order]
+    # Outside of `torch.func`, `Function.apply` only binds default values, by the signature that it makes anew at every call.
+    apply = kind.apply if transformed else super(torch.autograd.Function, kind).apply
+    return apply(name, *flags, *tensors)
 
 
 def _recorded(order, name, tensors, along, wanted):
