@@ -212,7 +212,7 @@ onPage("nothing moves by itself where motion is to be reduced", "#tab=pose", asy
 for (const [device, width, height] of [["laptop", 1280, 800], ["phone", 390, 844]]) {
   onPage(`the first screen of a ${device} has three doors and the start of the playground`, "", async (page) => {
     const bottom = async (selector, edge = "bottom") => page.locator(selector).first().evaluate((element, edge) => element.getBoundingClientRect()[edge], edge);
-    assert.deepEqual(await page.locator(".doors h2").allTextContents(), ["I have masks", "I use torch", "I write Rust"]);
+    assert.deepEqual(await page.locator(".doors h2").allTextContents(), ["I have pictures", "I use torch", "I write Rust"]);
     assert.ok(await bottom(".doors section:last-child") < height, "all doors are visible");
     assert.ok(await bottom("#play .stage", "top") < height - 100, "the playground begins");
     assert.equal(await page.evaluate(() => scrollY), 0);
