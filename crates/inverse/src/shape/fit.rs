@@ -18,7 +18,7 @@ const EDGE_PX: f64 = 2.4;
 /// Fraction of a stage during which edges shorten to its length.
 const SHORTENS: f64 = 1.0 / 3.0;
 /// Fraction of the last stage after which the rate falls, and final over initial rate.
-const SETTLES: [f64; 2] = [0.15, 0.03];
+const SETTLES: [f64; 2] = [0.15, 0.05];
 /// Radius of the sphere, in units of half the extent of the object.
 const SPHERE: f64 = 0.5;
 /// Smoothing of a surface that is fitted to colours, relative to one that is not.
