@@ -32,7 +32,8 @@ const TRAINING: u64 = 6;
 
 fn main() -> anyhow::Result<()> {
     let study = Study::parse();
-    let head = ["task", "softness", "seeds", "fixed φ", "adapting, at its rate", "adapting − fixed"];
+    let head =
+        ["task", "softness", "seeds", "fixed φ", "adapting, at its rate", "adapting − fixed"];
     let mut table = Table::new(head.into_iter().chain(["`preset`", "adapting − `preset`"]));
     rows::<Pose>(&mut table, 48, &study)?;
     rows::<Occlusion>(&mut table, 50, &study)?;
