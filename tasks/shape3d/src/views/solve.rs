@@ -90,7 +90,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     // Faults of pictures are reported before the work.
     let sets: Vec<&Vec<View>> = loaded().collect();
     let (painted, warning) = painted_views(flags, &sets)?;
-    let in_colour = painted.is_some();
+    let in_colour = !painted.is_empty();
     if flags.texture_size.is_some() && !in_colour {
         return Err(Error::usage(
             "--texture-size sizes a texture, and there is none: add --colour (grey pictures and --normals have no texture otherwise)",
@@ -108,7 +108,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     };
     let normals = normals.iter().map(PaintedView::load).collect::<anyhow::Result<Vec<_>>>()?;
     let [train, held_out] = split_held_out(all, count)?;
-    let mut painted = painted.unwrap_or_default().into_iter();
+    let mut painted = painted.into_iter();
     let [to_paint, painted_aside] = match painted.next() {
         Some(painted) => split_held_out(painted, count)?,
         None => [Vec::new(), Vec::new()],
@@ -175,14 +175,14 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     answer(given, &mesh, textured.as_ref(), &scored, notes, seconds)
 }
 
-/// The views of each set with the colours of their pictures, if these are asked for, or can all be read and some are not grey; and a warning,
-/// if some picture cannot be read, so that the masks alone are used.
+/// The views of each set with the colours of their pictures, if these are asked for, or can all be read and some are not grey: else nothing.
+/// And a warning, if some picture cannot be read, so that the masks alone are used.
 fn painted_views(
     flags: &Views,
     sets: &[&Vec<View>],
-) -> anyhow::Result<(Option<Vec<Vec<PaintedView>>>, Option<String>)> {
+) -> anyhow::Result<(Vec<Vec<PaintedView>>, Option<String>)> {
     if !flags.colour && (flags.masks_only || flags.normals.is_some()) {
-        return Ok((None, None));
+        return Ok((Vec::new(), None));
     }
     let mut failed = Vec::new();
     let mut painted = Vec::new();
@@ -198,21 +198,24 @@ fn painted_views(
         painted.push(of_set);
     }
     if flags.colour {
-        return Ok((Some(painted), None));
+        return Ok((painted, None));
     }
     let in_colour = painted.iter().flatten().any(PaintedView::is_coloured);
     // A folder may have masks and no pictures.
     let told = failed.iter().find(|(view, _)| in_colour || view.picture.is_file());
     if let Some((_, error)) = told {
-        return Ok((None, Some(format!("the masks alone are used, and no colours: {error:#}"))));
+        return Ok((
+            Vec::new(),
+            Some(format!("the masks alone are used, and no colours: {error:#}")),
+        ));
     }
     if !in_colour || !failed.is_empty() {
-        return Ok((None, None));
+        return Ok((Vec::new(), None));
     }
     say(
         "the pictures have colours, which pull the shape and paint it (--masks-only uses the masks alone)",
     );
-    Ok((Some(painted), None))
+    Ok((painted, None))
 }
 
 /// The views with pictures of their normals: their own, or those of a folder.
