@@ -1,6 +1,6 @@
-"""A step of an optimisation, float32: projection, image, mean squared difference by `st.mse_loss`, gradient to the vertices.
+"""A step of an optimisation, float32: projection, image, mean squared difference (by `st.mse_loss`, or by ops of torch), gradient to the vertices.
 
-`python bindings/python/benches/steps.py [--mesh W2_MESH.obj] [--rust target/release/examples/step]`, in an environment with the wheel and torch.
+`python bindings/python/benches/steps.py [--mesh W2_MESH.obj] [--rust target/release/examples/step] [--loss torch]`, in an environment with the wheel and torch.
 
 W1 is a sphere of 1,280 faces in 24 views of 64 x 64; with a mesh it is W2, one view of 256 x 256. With the path of the example `step` the step
 in Rust is timed in turn with ours, so that both have the same neighbours on the machine; else, beside W1, the published formula
@@ -21,6 +21,7 @@ import softrast.torch as st
 parser = argparse.ArgumentParser()
 parser.add_argument("--mesh")
 parser.add_argument("--rust")
+parser.add_argument("--loss", choices=["softrast", "torch"], default="softrast")
 given = parser.parse_args()
 
 SIGMA = 1e-4
@@ -64,7 +65,8 @@ target = torch.zeros(VIEWS, SIZE, SIZE)
 
 
 def loss(vertices):
-    return st.mse_loss(st.silhouette(renderer, st.project(vertices, cameras)), target).mean()
+    image = st.silhouette(renderer, st.project(vertices, cameras))
+    return (st.mse_loss(image, target) if given.loss == "softrast" else (image - target).pow(2)).mean()
 
 
 def ours():

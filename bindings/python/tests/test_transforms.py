@@ -149,6 +149,29 @@ def test_function_transforms_agree_with_autograd(with_phi):
     close(many.sum(0), gradient)
 
 
+def test_a_gradient_outside_of_its_transform_has_a_gradient():
+    corners, cameras = scene()
+    draw = image(renderer())
+    weights = torch.rand(2, 4, 5, generator=torch.Generator().manual_seed(2), **F64)
+    of_transform, of_autograd = (corners.clone().requires_grad_() for _ in range(2))
+    _, back = torch.func.vjp(lambda corners: draw(corners, cameras), of_transform)
+    (gradient,) = back(weights)
+    (expected,) = torch.autograd.grad((draw(of_autograd, cameras) * weights).sum(), of_autograd, create_graph=True)
+    for corners, gradient in ((of_transform, gradient), (of_autograd, expected)):
+        (gradient.pow(2).sum() + corners.pow(2).sum()).backward()
+    assert torch.equal(gradient, expected) and torch.allclose(of_transform.grad, of_autograd.grad, rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_traces_follow_their_inputs_or_are_refused():
+    corners, cameras = scene()
+    draw = image(renderer())
+    traced = torch.jit.trace(draw, (corners, cameras), check_trace=False)
+    assert torch.equal(traced(0.8 * corners, cameras), draw(0.8 * corners, cameras))
+    with pytest.raises(RuntimeError, match="torch.func.jvp"):
+        torch.func.linearize(lambda corners: draw(corners, cameras), corners)
+
+
 def test_the_curvature_of_a_surrogate_is_the_same_in_both_modes():
     draw = renderer(softness=softrast.Softness.learned("shape3d-surrogate"))
     corners, cameras = scene()

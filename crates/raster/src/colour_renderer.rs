@@ -201,6 +201,16 @@ impl<S: Softness> ColourRenderer<S> {
     /// Sets the parameters of the edge softness to the defaults for this width, as [`SoftRenderer::set_width`](crate::SoftRenderer::set_width)
     /// does. The depth softness keeps its own.
     ///
+    /// ```
+    /// use softrast_raster::ColourRenderer;
+    /// use softrast_softness::Family;
+    ///
+    /// let of_width = |width| ColourRenderer::new(&[[0, 1, 2]], 16, Family::Logistic, width, [1.0, 4.0]);
+    /// let mut renderer = of_width(0.1);
+    /// renderer.set_width(0.01);
+    /// assert_eq!(renderer.phi(), of_width(0.01).phi());
+    /// ```
+    ///
     /// # Panics
     ///
     /// If the width is not positive.

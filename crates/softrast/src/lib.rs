@@ -21,7 +21,7 @@
 //! in files are returned; wrong shapes panic, with the found and the expected shape.
 //!
 //! [`tensor`] re-exports the tensors, backends and autodiff of burn 0.21; types of other burn releases are incompatible. The Cargo features
-//! `ndarray` (default), `flex`, `wgpu` and `cuda` select the backend. [`inverse`], [`views`] and [`meta`] need the feature `inverse`, which also
+//! `ndarray` (default), `flex`, `wgpu` and `cuda` add backends. [`inverse`], [`views`] and [`meta`] need the feature `inverse`, which also
 //! builds burn's modules and optimisers and the readers of pictures; images of meshes and their derivatives need only a backend.
 //!
 //! ```

@@ -174,7 +174,7 @@ fn grey_pictures_are_masks_alone_unless_colours_are_asked_for() {
 }
 
 #[test]
-fn masks_alone_are_told_where_one_picture_cannot_be_read() {
+fn an_unreadable_picture_leaves_the_masks_alone_with_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     pictures(folder.path(), true);
     let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));

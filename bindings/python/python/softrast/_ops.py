@@ -8,6 +8,7 @@ and share the formulas of their derivatives.
 from __future__ import annotations
 
 import functools
+import sys
 
 import torch
 
@@ -20,7 +21,11 @@ _NAMES = ("orbit_matrix", "project", "silhouette", "blend", "mse_loss", "iou_los
 _SCHEMA = "(Tensor[] tensors, str function, str along, str wanted) -> Tensor[]"
 # Older versions draw and differentiate in eager mode, without torch.func and torch.compile.
 _COMPILES = hasattr(torch.library, "register_vmap")
-_transformed = getattr(torch._C, "_are_functorch_transforms_active", lambda: True)
+try:
+    from torch._C import _are_functorch_transforms_active as _transformed
+    from torch._functorch.utils import unwrap_dead_wrappers as _unwrapped
+except ImportError:
+    _transformed, _unwrapped = (lambda: True), None
 
 
 def value(kind, name, inputs):
@@ -115,14 +120,20 @@ def _jvp_back(call, name, saved, needed, along, upstream):
 
 
 def _eager(order, name, tensors, along, wanted):
-    transformed, along = _transformed(), [bool(moves) for moves in along]
+    along, transformed = [bool(moves) for moves in along], _transformed()
+    tracing = sys.modules.get("torch.fx.experimental.proxy_tensor")
+    if tracing is not None and tracing.get_proxy_mode() is not None:
+        raise RuntimeError("softrast's ops cannot be traced by torch.fx (make_fx, torch.func.linearize): take torch.func.jvp, or torch.compile")
+    if not transformed:
+        # Tensors of a transform of `torch.func` that has ended.
+        tensors = _unwrapped(tuple(tensors))
     # An autograd function takes a quarter of a millisecond, even where nothing is recorded: as a rule on the way back, and for cameras.
     recorded = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in tensors)
-    if not (transformed or recorded or torch.autograd.forward_ad._current_level >= 0):
+    if not (transformed or recorded or torch.autograd.forward_ad._current_level >= 0 or torch.jit.is_tracing()):
         return _computed(order, name, tensors, along, wanted)
     kind = {"": _Value, "_vjp": _Vjp, "_jvp": _Jvp, "_vjp_of_vjp": _VjpOfVjp}[order]
     flags = {"": (), "_vjp": (wanted,), "_jvp": (along,), "_vjp_of_vjp": (along, wanted)}[order]
-    # Outside of `torch.func`, `Function.apply` only binds default values, by the signature that it makes anew at every call.
+    # Beside what is done above `Function.apply` binds default values, by a signature that it makes anew at every call.
     apply = kind.apply if transformed else super(torch.autograd.Function, kind).apply
     return apply(name, *flags, *tensors)
 

@@ -46,7 +46,7 @@ class Renderer:
         self._by_own_name, self._by_phi_name = self._by_own.handle, self._by_phi.handle
 
     def with_faces(self, faces: ArrayLike) -> Renderer:
-        """This renderer for other `faces` `[F, 3]`. It keeps knots and tables, so a mesh that is remeshed every few steps need not choose them again."""
+        """This renderer for other `faces` `[F, 3]`. It keeps its knots unless there are more faces than they were chosen for."""
         return _with_faces(self, faces)
 
     @property
@@ -123,7 +123,7 @@ class ColourRenderer:
         return self._functions[key]
 
     def with_faces(self, faces: ArrayLike) -> ColourRenderer:
-        """This renderer for other `faces` `[F, 3]`, with its knots and tables, as `Renderer.with_faces`."""
+        """This renderer for other `faces` `[F, 3]`, and the knots as in `Renderer.with_faces`."""
         return _with_faces(self, faces)
 
     @property
@@ -173,6 +173,7 @@ class ColourRenderer:
 
 def _with_faces(renderer: Any, faces: ArrayLike) -> Any:
     other = object.__new__(type(renderer))
+    other.__dict__.update(renderer.__dict__)
     other._settings = {**renderer._settings, "faces": _shapes.faces(faces)}
     other._draw_by(renderer._native.with_faces(other._settings["faces"]))
     return other

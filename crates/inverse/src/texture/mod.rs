@@ -15,7 +15,7 @@ const SIZES: [usize; 2] = [64, 4096];
 /// The most that are chosen where nobody asks for a number.
 const MOST: usize = 2048;
 /// Power of the cosine between the surface and the direction to a camera by which a pixel counts: a view from the side shows it blurred, and where the
-/// surface is a little off, another place of it. On spot, held out, 0 ends at 31.07 dB, 1 at 31.12, 2 at 31.13.
+/// surface is a little off, another place of it. On spot, held out, 1 gains 0.05 dB over 0, 2 gains 0.06 dB.
 const FACING: f64 = 2.0;
 /// The part of a square that charts cover, about.
 const COVERED: f64 = 0.6;

@@ -92,9 +92,12 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let (painted, warning) = painted_views(flags, &sets)?;
     let in_colour = !painted.is_empty();
     if flags.texture_size.is_some() && !in_colour {
-        return Err(Error::usage(
-            "--texture-size sizes a texture, and there is none: add --colour (grey pictures and --normals have no texture otherwise)",
-        ));
+        let why = warning.unwrap_or_else(|| {
+            "add --colour (grey pictures and --normals have no texture otherwise)".to_owned()
+        });
+        return Err(Error::usage(format!(
+            "--texture-size sizes a texture, and there is none: {why}"
+        )));
     }
     given.will_write(names(in_colour), reads.into_inner().into_iter().chain(pictures))?;
     let note = cameras.note().map(str::to_owned);
@@ -184,15 +187,27 @@ fn painted_views(
     if !flags.colour && (flags.masks_only || flags.normals.is_some()) {
         return Ok((Vec::new(), None));
     }
-    let mut failed = Vec::new();
-    let mut painted = Vec::new();
+    let (mut painted, mut in_colour) = (Vec::new(), false);
+    let mut failed: Option<(bool, anyhow::Error)> = None;
     for views in sets {
         let mut of_set = Vec::new();
         for view in *views {
             match PaintedView::load(view) {
-                Ok(view) => of_set.push(view),
+                Ok(view) => {
+                    in_colour |= view.is_coloured();
+                    if failed.is_none() {
+                        of_set.push(view);
+                    }
+                }
                 Err(error) if flags.colour => return Err(error),
-                Err(error) => failed.push((view, error)),
+                Err(error) => failed = failed.or(Some((view.picture.is_file(), error))),
+            }
+            // A folder may have masks and no pictures, so one that is missing is worth a word only beside others.
+            if let Some((exists, error)) = &failed
+                && (*exists || in_colour)
+            {
+                let warning = format!("the masks alone are used, and no colours: {error:#}");
+                return Ok((Vec::new(), Some(warning)));
             }
         }
         painted.push(of_set);
@@ -200,16 +215,7 @@ fn painted_views(
     if flags.colour {
         return Ok((painted, None));
     }
-    let in_colour = painted.iter().flatten().any(PaintedView::is_coloured);
-    // A folder may have masks and no pictures.
-    let told = failed.iter().find(|(view, _)| in_colour || view.picture.is_file());
-    if let Some((_, error)) = told {
-        return Ok((
-            Vec::new(),
-            Some(format!("the masks alone are used, and no colours: {error:#}")),
-        ));
-    }
-    if !in_colour || !failed.is_empty() {
+    if !in_colour || failed.is_some() {
         return Ok((Vec::new(), None));
     }
     say(
