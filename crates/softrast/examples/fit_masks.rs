@@ -15,7 +15,7 @@ fn main() -> anyhow::Result<()> {
     let views = Views::load(std::env::args().nth(1).unwrap_or("data/views/fox".into()))?;
     let (masks, cameras) = (views.masks::<B>(&device), views.cameras::<B>(&device));
     let mut shape = VertexModel::<B>::new(&icosphere(3), &device);
-    let width = Width::pixels(3.0).to(0.3);
+    let width = Width::pixels(2.0).to(0.3);
     let mut renderer = SoftRenderer::new(shape.faces(), views.size(), Family::Gauss, width.at(0.0));
     let mut adam = AdamConfig::new().init();
     for step in 0..200 {
