@@ -187,35 +187,24 @@ fn painted_views(
     if !flags.colour && (flags.masks_only || flags.normals.is_some()) {
         return Ok((Vec::new(), None));
     }
-    let (mut painted, mut in_colour) = (Vec::new(), false);
-    let mut failed: Option<(bool, anyhow::Error)> = None;
-    for views in sets {
-        let mut of_set = Vec::new();
-        for view in *views {
-            match PaintedView::load(view) {
-                Ok(view) => {
-                    in_colour |= view.is_coloured();
-                    if failed.is_none() {
-                        of_set.push(view);
-                    }
-                }
-                Err(error) if flags.colour => return Err(error),
-                Err(error) => failed = failed.or(Some((view.picture.is_file(), error))),
-            }
-            // A folder may have masks and no pictures, so one that is missing is worth a word only beside others.
-            if let Some((exists, error)) = &failed
-                && (*exists || in_colour)
-            {
-                let warning = format!("the masks alone are used, and no colours: {error:#}");
-                return Ok((Vec::new(), Some(warning)));
-            }
-        }
-        painted.push(of_set);
+    // A folder may have masks and no pictures.
+    let mut all = sets.iter().flat_map(|views| views.iter());
+    if !flags.colour && !all.any(|view| view.picture.is_file()) {
+        return Ok((Vec::new(), None));
     }
+    let load = |views: &&Vec<View>| views.iter().map(PaintedView::load).collect();
+    let painted: anyhow::Result<Vec<Vec<PaintedView>>> = sets.iter().map(load).collect();
+    let painted = match painted {
+        Err(error) if !flags.colour => {
+            let warning = format!("the masks alone are used, and no colours: {error:#}");
+            return Ok((Vec::new(), Some(warning)));
+        }
+        painted => painted?,
+    };
     if flags.colour {
         return Ok((painted, None));
     }
-    if !in_colour || failed.is_some() {
+    if !painted.iter().flatten().any(PaintedView::is_coloured) {
         return Ok((Vec::new(), None));
     }
     say(
