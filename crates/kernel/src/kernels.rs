@@ -1,6 +1,6 @@
 use crate::{
     Bands, Float, Inputs, Judged, PixelLoss,
-    blend::{self, Kept},
+    blend::{self, Judge, Kept},
     loss, pairs, sum,
 };
 
@@ -58,6 +58,15 @@ pub trait Kernels: Float {
         upstream: &[Self],
         wanted: [bool; 5],
     ) -> Vec<Self>;
+
+    /// Losses `[views]` of the image, as `judge` finds them, and the gradients of their sum with respect to the inputs that are wanted, as by
+    /// [`Kernels::blend_vjp`]; tables have none.
+    fn blend_judged(
+        inputs: &blend::Inputs<Self>,
+        kept: &Kept<Self>,
+        judge: &Judge<Self>,
+        wanted: [bool; 5],
+    ) -> [Vec<Self>; 2];
 
     /// Pullback of `direction` through [`Kernels::blend_vjp`]; `direction` has the layout of its result with `along` wanted. Gradients with
     /// respect to the inputs and the upstream, those that are wanted, concatenated in this order.
@@ -132,6 +141,15 @@ macro_rules! kernels {
                 wanted: [bool; 5],
             ) -> Vec<Self> {
                 blend::vjp(inputs, kept, upstream, wanted)
+            }
+
+            fn blend_judged(
+                inputs: &blend::Inputs<Self>,
+                kept: &Kept<Self>,
+                judge: &Judge<Self>,
+                wanted: [bool; 5],
+            ) -> [Vec<Self>; 2] {
+                blend::judged(inputs, kept, judge, wanted)
             }
 
             fn blend_vjp_of_vjp(

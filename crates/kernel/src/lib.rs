@@ -79,6 +79,7 @@ mod pair;
 mod pairs;
 mod reach;
 mod real;
+mod rooms;
 mod scene;
 mod sum;
 mod table;

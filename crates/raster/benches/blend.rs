@@ -9,7 +9,7 @@
 //! in colour also to the vertex colours. Medians in `f32`, measured alternately; the edge softness is that of the silhouettes, and the
 //! planes lie around the mesh. With a depth softness so wide that depths hardly matter, all faces have the support of a silhouette of
 //! another tolerance, so both visit the same pairs. The last columns are the step at the default scale, where near faces have a larger
-//! support, with all faces and with front faces only.
+//! support, with all faces and with front faces only, with the loss as an op of its own and as one op with the image.
 
 #[allow(dead_code, reason = "the other benchmark uses the rest")]
 mod coloured;
@@ -42,9 +42,9 @@ fn main() {
     let filter = std::env::args().skip(1).find(|word| word != "--bench");
     println!("{}", machine::machine());
     println!(
-        "| scene | threads | silhouette, ms | image, ms | colour, ms | ratio | default, ms | front, ms |"
+        "| scene | threads | silhouette, ms | image, ms | colour, ms | ratio | default, ms | front, ms | one op, ms | front, ms |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     let narrow = Workload {
         name: "W2, edges half a pixel wide".into(),
         width: 1.0 / 256.0,
@@ -61,18 +61,21 @@ fn main() {
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.expect("threads can be started");
-            let [silhouette, image, colour, default, front] = pool.install(|| {
-                medians([
-                    &|| drop(black_box(silhouettes.step())),
-                    &|| drop(black_box(flat.image())),
-                    &|| drop(black_box(flat.step())),
-                    &|| drop(black_box(default.step())),
-                    &|| drop(black_box(front.step())),
-                ])
-            });
+            let [silhouette, image, colour, default, front, fused, fused_front] =
+                pool.install(|| {
+                    medians([
+                        &|| drop(black_box(silhouettes.step())),
+                        &|| drop(black_box(flat.image())),
+                        &|| drop(black_box(flat.step())),
+                        &|| drop(black_box(default.step())),
+                        &|| drop(black_box(front.step())),
+                        &|| drop(black_box(default.fused_step())),
+                        &|| drop(black_box(front.fused_step())),
+                    ])
+                });
             let ratio = colour / silhouette;
             println!(
-                "| {} | {threads} | {silhouette:.2} | {image:.2} | {colour:.2} | {ratio:.2} | {default:.2} | {front:.2} |",
+                "| {} | {threads} | {silhouette:.2} | {image:.2} | {colour:.2} | {ratio:.2} | {default:.2} | {front:.2} | {fused:.2} | {fused_front:.2} |",
                 workload.name
             );
         }

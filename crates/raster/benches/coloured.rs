@@ -2,7 +2,9 @@
 
 use std::{sync::Arc, time::Instant};
 
-use softrast_raster::{Attributes, ColourRenderer, RasterBackend, Weighting, mse_loss, project};
+use softrast_raster::{
+    Attributes, Background, ColourRenderer, Projected, RasterBackend, Weighting, mse_loss, project,
+};
 use softrast_softness::{DepthSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, DType, Tensor};
 
@@ -69,21 +71,46 @@ impl<B: RasterBackend> Coloured<B> {
         self.renderer.image(seen, &self.colours, &background)
     }
 
+    /// The gradients of a step whose loss is one op with the image, with respect to the world vertices and their colours.
+    pub(crate) fn fused_step(&self) -> [Tensor<B, 3>; 2] {
+        let Tracked { world, colours, seen, attributes, background } = self.tracked();
+        let picture = Tensor::from_inner(self.picture.clone());
+        let loss = self.renderer.mse_loss(seen, &attributes, &background, picture);
+        let gradients = loss.mean().backward();
+        [&world, &colours].map(|of| of.grad(&gradients).expect("it is seen"))
+    }
+
     /// The image, its gradients with respect to the world vertices and their colours, and the milliseconds of both.
     pub(crate) fn step(&self) -> (Tensor<B, 4>, [Tensor<B, 3>; 2], f64) {
         let start = Instant::now();
+        let Tracked { world, colours, seen, attributes, background } = self.tracked();
+        let image = self.renderer.image(seen, &attributes, &background);
+        let gradients =
+            mse_loss(image.clone(), Tensor::from_inner(self.picture.clone())).mean().backward();
+        let both = [&world, &colours].map(|of| of.grad(&gradients).expect("it is seen"));
+        (image.inner(), both, start.elapsed().as_secs_f64() * 1e3)
+    }
+
+    fn tracked(&self) -> Tracked<Autodiff<B>> {
         let tracked = |tensor: &Tensor<B, 3>| {
             Tensor::<Autodiff<B>, 3>::from_inner(tensor.clone()).require_grad()
         };
         let (world, colours) = (tracked(&self.world), tracked(self.colours.values()));
-        let seen = project(world.clone(), Tensor::from_inner(self.cameras.clone()));
-        let attributes = Attributes::new(colours.clone(), self.faces.clone());
-        let background = self.renderer.background(&[0.0; COLOURS], &world.device());
-        let image = self.renderer.image(seen, &attributes, &background);
-        let gradients =
-            mse_loss(image.clone(), Tensor::from_inner(self.picture.clone())).mean().backward();
-        let gradient = |of: &Tensor<Autodiff<B>, 3>| of.grad(&gradients).expect("it is seen");
-        let both = [gradient(&world), gradient(&colours)];
-        (image.inner(), both, start.elapsed().as_secs_f64() * 1e3)
+        Tracked {
+            seen: project(world.clone(), Tensor::from_inner(self.cameras.clone())),
+            attributes: Attributes::new(colours.clone(), self.faces.clone()),
+            background: self.renderer.background(&[0.0; COLOURS], &world.device()),
+            world,
+            colours,
+        }
     }
+}
+
+/// A workload with gradients to the world vertices and their colours.
+struct Tracked<A: RasterBackend> {
+    world: Tensor<A, 3>,
+    colours: Tensor<A, 3>,
+    seen: Projected<A>,
+    attributes: Attributes<A>,
+    background: Background<A>,
 }

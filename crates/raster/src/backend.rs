@@ -40,7 +40,16 @@ pub trait RasterBackend: Backend {
         None
     }
 
-    /// Runs a pass of an op. Backends whose tensors are not on the host run all ops except [`FusedOp::SilhouetteLoss`]. On WebAssembly only
+    /// How often results are differentiable.
+    const ORDERS: usize = 0;
+
+    /// Whether a tensor has a gradient.
+    fn is_tracked(tensor: &FloatTensor<Self>) -> bool {
+        let _ = tensor;
+        false
+    }
+
+    /// Runs a pass of an op. Backends whose tensors are not on the host run no [`FusedOp::SilhouetteLoss`] or [`FusedOp::BlendLoss`]. On WebAssembly only
     /// f32 is supported, which makes the module of a page smaller.
     fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
         match tensors[0].dtype() {
@@ -293,6 +302,11 @@ fn split<B: Backend>(flat: FloatTensor<B>, shapes: &[Shape]) -> Vec<FloatTensor<
 
 impl<B: RasterBackend, C: CheckpointStrategy> RasterBackend for Autodiff<B, C> {
     const ON_HOST: bool = B::ON_HOST;
+    const ORDERS: usize = B::ORDERS + 1;
+
+    fn is_tracked(tensor: &FloatTensor<Self>) -> bool {
+        !tensor.node.requirement.is_none()
+    }
 
     fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
         match tensors.len() {

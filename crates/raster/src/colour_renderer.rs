@@ -1,3 +1,4 @@
+mod losses;
 mod op;
 mod prepared;
 
@@ -7,7 +8,7 @@ use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
 
 pub use self::prepared::WeightTables;
-use self::{op::soft_blend, prepared::Prepared};
+use self::{op::Call, prepared::Prepared};
 use crate::{
     Attributes, Background, HostBackend, ImageSize, Projected, RasterBackend, Rasterizer,
     Weighting, Width, cache::Cache, curve::precise, ops::FusedOp, ops::blend::SoftBlend,
@@ -256,6 +257,16 @@ impl<S: Softness> ColourRenderer<S> {
         attributes: &Attributes<B>,
         background: &Background<B>,
     ) -> Tensor<B, 4> {
+        self.call(vertices, attributes, background).image()
+    }
+
+    /// The op of an image, and its inputs.
+    fn call<B: RasterBackend>(
+        &self,
+        vertices: Projected<B>,
+        attributes: &Attributes<B>,
+        background: &Background<B>,
+    ) -> Call<B> {
         let vertices = vertices.tensor();
         let (device, dtype) = (vertices.device(), vertices.dtype());
         let prepared = self.prepared(&self.phi, number(background));
@@ -304,7 +315,7 @@ impl<S: Softness> ColourRenderer<S> {
         check(&self.weighting, &values);
         let prepared = self.prepared(&values, number(background));
         let tables = prepared.tables(phi);
-        self.drawn(&prepared, vertices.tensor(), attributes, tables, background)
+        self.drawn(&prepared, vertices.tensor(), attributes, tables, background).image()
     }
 
     /// The op of [`image_with`](Self::image_with), and the tables it needs, for callers that run it on slices: for these values of the
@@ -335,10 +346,10 @@ impl<S: Softness> ColourRenderer<S> {
         attributes: &Attributes<B>,
         tables: Tensor<B, 2>,
         background: &Background<B>,
-    ) -> Tensor<B, 4> {
+    ) -> Call<B> {
         let texture = attributes.texture.as_ref().map(texture_size);
         let op = self.blend_op(prepared, attributes.entries.clone(), texture);
-        soft_blend(op, vertices, attributes, tables, background)
+        Call::new(op, vertices, attributes, tables, background)
     }
 
     fn blend_op(

@@ -135,6 +135,7 @@ pub mod low_level {
         backend::profile_sum,
         colour_renderer::WeightTables,
         ops::blend::SoftBlend,
+        ops::blend_loss::BlendLoss,
         ops::loss::SilhouetteLoss,
         ops::sum::ProfileSum,
         ops::{ElementaryOp, FusedOp, Numbers, Pass},

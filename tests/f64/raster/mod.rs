@@ -3,6 +3,7 @@
 mod bad_cases;
 mod camera;
 mod colour;
+mod colour_loss;
 mod elementary;
 mod fused;
 mod hard;

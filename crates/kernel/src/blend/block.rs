@@ -85,7 +85,22 @@ impl<T: Real> Block<T> {
         } else {
             run::<T::Lanes, _>(Measure::<T, PULLS, false, false> { blend, list, block: self });
         }
-        run::<T::Lanes, _>(Weigh::<T, PULLS> { blend, table, list, shown, block: self });
+        run::<T::Lanes, _>(Weigh::<T, PULLS> {
+            of: Locate { blend, list, shown, block: self },
+            table,
+        });
+    }
+
+    /// Computes everything but the slopes by edge, which are known, for visitors with gradients. The logarithms by edge are those of weights
+    /// before, and those of edge softnesses after.
+    #[inline(always)]
+    pub(super) fn locate(&mut self, blend: &Blend<T>, list: &List<T>, shown: &Shown<T>) {
+        let of = Locate { blend, list, shown, block: self };
+        if blend.scene.lookup.has_far_cells() || list.slivers {
+            run::<T::Lanes, _>(Relocate::<T, true> { of });
+        } else {
+            run::<T::Lanes, _>(Relocate::<T, false> { of });
+        }
     }
 }
 
@@ -126,24 +141,64 @@ impl<T: Real, const PULLS: bool, const FAR: bool, const SLIVERS: bool> Work
 
 /// Computes points of the faces, their depths, and logarithms of softnesses.
 struct Weigh<'a, 's, T: Real, const PULLS: bool> {
-    blend: &'a Blend<'s, T>,
+    of: Locate<'a, 's, T, PULLS>,
     table: Table<'a, T>,
-    list: &'a List<T>,
-    shown: &'a Shown<T>,
-    block: &'a mut Block<T>,
 }
 
 impl<T: Real, const PULLS: bool> Work for Weigh<'_, '_, T, PULLS> {
     type Output = ();
 
     #[inline(always)]
-    fn run(mut self) {
-        self.locate();
-        self.weigh();
+    fn run(self) {
+        let Self { mut of, table } = self;
+        of.locate();
+        of.weigh();
+        let block = of.block;
+        let zero = T::constant(splat(0.0));
+        for k in 0..block.count.min(BLOCK) {
+            let [value, slope] = cubic(T::rows(table, &block.edge_row[k]), block.edge_t[k]);
+            block.log_edge[k] = zero - value;
+            if PULLS {
+                block.edge_slope[k] = slope.scale(block.edge_rate[k].neg());
+            }
+        }
     }
 }
 
-impl<T: Real, const PULLS: bool> Weigh<'_, '_, T, PULLS> {
+/// Computes closest points of the boundaries, points of the faces, their depths, and logarithms of depth softnesses.
+struct Relocate<'a, 's, T: Real, const SLIVERS: bool> {
+    of: Locate<'a, 's, T, true>,
+}
+
+impl<T: Real, const SLIVERS: bool> Work for Relocate<'_, '_, T, SLIVERS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { mut of } = self;
+        let Locate { list, block, .. } = &mut of;
+        for k in 0..block.count.min(BLOCK) {
+            let (px, py) = T::Lanes::pixels(&block.places[k]);
+            block.closest[k] = closest::<T, SLIVERS>(list.face(block.owner[k]), px, py);
+        }
+        of.locate();
+        of.weigh();
+        let block = of.block;
+        for k in 0..block.count.min(BLOCK) {
+            block.log_edge[k] = block.log_edge[k] - block.log_depth[k];
+        }
+    }
+}
+
+/// Computes points of the faces and their depths, then logarithms of depth softnesses.
+struct Locate<'a, 's, T: Real, const PULLS: bool> {
+    blend: &'a Blend<'s, T>,
+    list: &'a List<T>,
+    shown: &'a Shown<T>,
+    block: &'a mut Block<T>,
+}
+
+impl<T: Real, const PULLS: bool> Locate<'_, '_, T, PULLS> {
     #[inline(always)]
     fn locate(&mut self) {
         let Self { list, shown, block, .. } = self;
@@ -172,16 +227,12 @@ impl<T: Real, const PULLS: bool> Weigh<'_, '_, T, PULLS> {
 
     #[inline(always)]
     fn weigh(&mut self) {
-        let Self { blend, table, block, .. } = self;
-        let zero = T::constant(splat(0.0));
+        let Self { blend, block, .. } = self;
         let (near, per_range) = (T::Lanes::splat(blend.near), T::Lanes::splat(blend.per_range));
         for k in 0..block.count.min(BLOCK) {
-            let [value, slope] = cubic(T::rows(*table, &block.edge_row[k]), block.edge_t[k]);
-            block.log_edge[k] = zero - value;
             let by_depth = blend.depth.at((T::constant(near) - block.depth[k]).scale(per_range));
             block.log_depth[k] = by_depth.log();
             if PULLS {
-                block.edge_slope[k] = slope.scale(block.edge_rate[k].neg());
                 block.by_depth[k] = by_depth;
             }
         }

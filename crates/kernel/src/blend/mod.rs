@@ -50,6 +50,7 @@
 mod band;
 mod block;
 mod depth;
+mod judged;
 mod point;
 mod pull;
 mod quads;
@@ -65,7 +66,8 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use self::{
-    band::{Band, BandSums, Walked},
+    band::{Band, BandSums, Drawn, Walked},
+    judged::Judged,
     pull::CORNER_NUMBERS,
     reach::Reached,
     scene::Blend,
@@ -73,6 +75,7 @@ use self::{
 };
 pub use self::{
     depth::{DepthGrid, LEAST},
+    judged::Judge,
     point::AREA,
     scene::{Inputs, NOTHING, counts_from},
     texture::TEXEL_CHANNELS,
@@ -80,7 +83,7 @@ pub use self::{
 use super::{
     bands::View,
     float::{self, Vectors},
-    lanes::{Plain, has_vectors, run},
+    lanes::{Lanes, Plain, has_vectors, run},
     real::{Dual, Float, Real},
     tasks::task,
 };
@@ -108,11 +111,10 @@ impl<F> Kept<F> {
 
 /// See [`Kernels::blend`](crate::Kernels::blend).
 pub(crate) fn forward<F: Vectors>(inputs: &Inputs<F>, kept: &Kept<F>) -> Vec<F> {
-    let tangents = [&[][..]; 5];
     if has_vectors() {
-        passes::<F::Best>(inputs, &inputs.blend(tangents), kept, None).image()
+        drawn::<F::Best>(inputs, [&[]; 5], kept, None).image()
     } else {
-        passes::<Plain<F>>(inputs, &inputs.blend(tangents), kept, None).image()
+        drawn::<Plain<F>>(inputs, [&[]; 5], kept, None).image()
     }
 }
 
@@ -123,12 +125,26 @@ pub(crate) fn vjp<F: Vectors>(
     upstream: &[F],
     wanted: [bool; 5],
 ) -> Vec<F> {
-    let tangents = [&[][..]; 5];
     let pull = Some((upstream, wanted));
     if has_vectors() {
-        passes::<F::Best>(inputs, &inputs.blend(tangents), kept, pull).gradient(wanted)
+        drawn::<F::Best>(inputs, [&[]; 5], kept, pull).gradient(wanted)
     } else {
-        passes::<Plain<F>>(inputs, &inputs.blend(tangents), kept, pull).gradient(wanted)
+        drawn::<Plain<F>>(inputs, [&[]; 5], kept, pull).gradient(wanted)
+    }
+}
+
+/// See [`Kernels::blend_judged`](crate::Kernels::blend_judged).
+pub(crate) fn judged<F: Vectors>(
+    inputs: &Inputs<F>,
+    kept: &Kept<F>,
+    judge: &Judge<F>,
+    wanted: [bool; 5],
+) -> [Vec<F>; 2] {
+    assert!(!wanted[2], "a loss has no gradient with respect to the tables");
+    if has_vectors() {
+        of_judged::<F::Best>(inputs, kept, judge, wanted)
+    } else {
+        of_judged::<Plain<F>>(inputs, kept, judge, wanted)
     }
 }
 
@@ -157,9 +173,9 @@ pub(crate) fn vjp_of_vjp<F: Vectors>(
     let [wanted @ .., to_upstream] = wanted;
     let pull = Some((upstream, wanted));
     let passed = if has_vectors() {
-        passes::<Dual<F::Best>>(inputs, &inputs.blend(tangents), kept, pull)
+        drawn::<Dual<F::Best>>(inputs, tangents, kept, pull)
     } else {
-        passes::<Dual<Plain<F>>>(inputs, &inputs.blend(tangents), kept, pull)
+        drawn::<Dual<Plain<F>>>(inputs, tangents, kept, pull)
     };
     let image = if to_upstream { passed.image() } else { Vec::new() };
     let mut gradient = passed.gradient(wanted);
@@ -169,6 +185,8 @@ pub(crate) fn vjp_of_vjp<F: Vectors>(
 
 /// Results of a band, of the bands of a view, or of all views. Results of dual numbers are tangents.
 struct Passed<F> {
+    /// View by view; 0 where nothing is judged.
+    losses: Vec<F>,
     /// `[views, channels + 1, height, width]`, view by view.
     images: Vec<Vec<F>>,
     /// `[views, 3, vertices]`, view by view.
@@ -201,57 +219,75 @@ impl<F: float::Float> Passed<F> {
     }
 }
 
-/// Runs all bands, with their gradients if there is an upstream; sums are taken in the order of views and bands.
+/// Draws all bands, or finds their gradients if there is an upstream.
+fn drawn<T: Real>(
+    inputs: &Inputs<Float<T>>,
+    tangents: [&[Float<T>]; 5],
+    kept: &Kept<Float<T>>,
+    upstream: Option<(&[Float<T>], [bool; 5])>,
+) -> Passed<Float<T>> {
+    let (blend, bands) = (inputs.blend(tangents), kept.reached.bands.count);
+    let name = if upstream.is_some() { "pull of a band" } else { "image of a band" };
+    passes(inputs, &blend, kept, upstream.map(|(_, wanted)| wanted), |of: Band<T>| {
+        let kept = kept.sums.get(of.view * bands + of.band);
+        task(name, || run::<T::Lanes, _>(Drawn { of, kept, upstream }))
+    })
+}
+
+/// Losses of all views, and their gradient.
+fn of_judged<L: Lanes>(
+    inputs: &Inputs<L::Float>,
+    kept: &Kept<L::Float>,
+    judge: &Judge<L::Float>,
+    wanted: [bool; 5],
+) -> [Vec<L::Float>; 2] {
+    let blend = inputs.blend([&[]; 5]);
+    let mut passed = passes(inputs, &blend, kept, Some(wanted), |of: Band<L>| {
+        task("loss of a band", || run::<L, _>(Judged { of, judge, wanted }))
+    });
+    [std::mem::take(&mut passed.losses), passed.gradient(wanted)]
+}
+
+/// Runs all bands; `wanted` are the gradients that they return. Sums are taken in the order of views and bands.
 fn passes<T: Real>(
     inputs: &Inputs<Float<T>>,
     blend: &Blend<T>,
     kept: &Kept<Float<T>>,
-    pull: Option<(&[Float<T>], [bool; 5])>,
+    wanted: Option<[bool; 5]>,
+    of_band: impl Fn(Band<T>) -> Walked<Float<T>> + Sync,
 ) -> Passed<Float<T>> {
     let zero = <Float<T> as float::Float>::ZERO;
-    let Kept { reached, sums } = kept;
+    let reached = &kept.reached;
     let bands = &reached.bands;
     let views = bands.views.len();
-    let of_image = (blend.channels + 1) * inputs.size.pixels();
-    let with_image = pull.is_none() || T::DUAL;
     let per_view: Vec<_> = (0..views)
         .into_par_iter()
         .map(|view| {
-            let upstream = pull.map(|(upstream, wanted)| {
-                (&upstream[view * of_image..(view + 1) * of_image], wanted)
-            });
-            let walked: Vec<_> = (0..bands.count)
-                .into_par_iter()
-                .map(|band| {
-                    let work = Band {
-                        blend,
-                        of_view: &bands.views[view],
-                        views,
-                        view,
-                        band,
-                        logs: &reached.logs[view],
-                        least: reached.least,
-                        kept: sums.get(view * bands.count + band),
-                        upstream,
-                    };
-                    task(if pull.is_some() { "pull of a band" } else { "image of a band" }, || {
-                        run::<T::Lanes, _>(work)
-                    })
-                })
-                .collect();
-            let wanted = pull.map(|(_, wanted)| wanted);
-            task("gather", || gather(blend, inputs, &bands.views[view], walked, with_image, wanted))
+            let of = |band| Band {
+                blend,
+                of_view: &bands.views[view],
+                views,
+                view,
+                band,
+                logs: &reached.logs[view],
+                least: reached.least,
+            };
+            let walked: Vec<_> =
+                (0..bands.count).into_par_iter().map(|band| of_band(of(band))).collect();
+            task("gather", || gather(blend, inputs, &bands.views[view], walked, wanted))
         })
         .collect();
     let mut passed = Passed {
+        losses: Vec::new(),
         images: Vec::new(),
         vertices: Vec::new(),
-        attributes: vec![zero; if pull.is_some() { inputs.attributes.len() } else { 0 }],
+        attributes: vec![zero; if wanted.is_some() { inputs.attributes.len() } else { 0 }],
         tables: Vec::new(),
         background: Vec::new(),
-        texels: blend.no_texels(pull.is_some_and(|(_, wanted)| wanted[4])),
+        texels: blend.no_texels(wanted.is_some_and(|wanted| wanted[4])),
     };
     for (index, mut view) in per_view.into_iter().enumerate() {
+        passed.losses.append(&mut view.losses);
         passed.images.append(&mut view.images);
         passed.vertices.append(&mut view.vertices);
         let first = blend.first_attribute(index).min(passed.attributes.len());
@@ -282,18 +318,16 @@ fn gather<T: Real>(
     inputs: &Inputs<Float<T>>,
     view: &View,
     walked: Vec<Walked<Float<T>>>,
-    with_image: bool,
     wanted: Option<[bool; 5]>,
 ) -> Passed<Float<T>> {
     let zero = <Float<T> as float::Float>::ZERO;
     let (channels, numbers) = (blend.channels, blend.numbers);
     let mut image = Vec::new();
-    if with_image {
-        for plane in 0..=channels {
-            walked.iter().for_each(|band| image.extend_from_slice(&band.image[plane]));
-        }
+    for plane in 0..=channels {
+        walked.iter().filter_map(|band| band.image.get(plane)).for_each(|rows| image.extend(rows));
     }
     let mut passed = Passed {
+        losses: vec![walked.iter().fold(zero, |loss, band| loss + band.loss)],
         images: vec![image],
         vertices: Vec::new(),
         attributes: Vec::new(),

@@ -27,7 +27,7 @@ pub(super) struct Pull<'a, T: Real> {
     /// Four numbers per pixel. 0: the logarithm that weights are relative to; 1: one over the sum of all weights; 2: `Σ upstream · image`
     /// over the channels, minus the upstream of the faces' share; 3: the logarithm of the weight below which a face is culled.
     pub(super) pixels: &'a Quads<Float<T>>,
-    /// Number 3 of the pixels, contiguous: each chunk reads it to decide whether it is skipped.
+    /// Number 3 of the pixels, contiguous: each chunk reads it to decide whether it counts.
     pub(super) limits: &'a [Float<T>],
     /// The upstream by channels, without tangents.
     pub(super) upstream: &'a Quads<Float<T>>,
@@ -45,6 +45,12 @@ pub(super) struct Pull<'a, T: Real> {
 }
 
 impl<T: Real> Pull<'_, T> {
+    /// Whether weights of this logarithm count at some of these pixels.
+    #[inline(always)]
+    pub(super) fn counts(&self, at: [u32; 2], log: T::Lanes) -> bool {
+        T::Lanes::bits(of_pixels::<T>(self.limits, at).less(log)) != 0
+    }
+
     /// Adds to the gradient of a number of the attributes; `by_number` is the derivative with respect to it at the point of a pair.
     #[inline(always)]
     fn pull_attribute(&mut self, number: usize, by_number: T, weights: [T; 3]) {
@@ -76,20 +82,13 @@ impl<T: Real> Pull<'_, T> {
     }
 }
 
-/// Whether a mask holds in no lane.
-#[inline(always)]
-fn nowhere<L: Lanes>(mask: L::Mask) -> bool {
-    L::bits(mask) == 0
-}
-
 impl<T: Real> Visitor<T> for Pull<'_, T> {
     const PULLS: bool = true;
 
     #[inline(always)]
     fn skips(&self, face: &FaceAttributes<T>, at: [u32; 2]) -> bool {
         // The sums are known now, and with them the faces that nearer faces hide.
-        let log = T::Lanes::splat(face.log);
-        nowhere::<T::Lanes>(of_pixels::<T>(self.limits, at).less(log))
+        !self.counts(at, T::Lanes::splat(face.log))
     }
 
     #[inline(always)]
@@ -101,8 +100,7 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
         for k in 0..count {
             let log = block.log_edge[k].value() + block.log_depth[k].value();
             live[some % BLOCK] = k;
-            let limit = of_pixels::<T>(self.limits, block.at[k]);
-            some += usize::from(!nowhere::<T::Lanes>(limit.less(log)));
+            some += usize::from(self.counts(block.at[k], log));
         }
         let live = &live[..some.min(BLOCK)];
         // Shares of the image: of the weight, and of its part before the floor of the edge softness is subtracted.

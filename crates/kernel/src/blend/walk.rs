@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::{
+    band::Band,
     block::{BLOCK, Block},
     scene::Blend,
     shown::{FaceAttributes, Shown},
@@ -39,25 +40,23 @@ pub(super) trait Visitor<T: Real> {
 }
 
 /// A walk over the pairs of a band.
-pub(super) struct Walk<'a, 's, T: Real, V> {
-    pub(super) blend: &'a Blend<'s, T>,
+pub(super) struct Walk<'a, 's, 'v, T: Real, V> {
+    pub(super) of: Band<'a, 's, T>,
     pub(super) place: BandRef<'a, T>,
-    pub(super) view: usize,
-    /// Logarithm of the largest depth weight of each face.
-    pub(super) logs: &'a [f32],
-    pub(super) visitor: &'a mut V,
+    pub(super) visitor: &'v mut V,
 }
 
-impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
+impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, '_, T, V> {
     type Output = ();
 
     #[inline(always)]
     fn run(mut self) {
-        let blend = self.blend;
+        let blend = self.of.blend;
         let mut list = List::new();
         let mut shown = Shown::new(blend.numbers);
         let mut block = Block::nothing();
-        for (k, numbers) in self.place.numbers.chunks(LISTED).enumerate() {
+        let lists = self.place.numbers.chunks(LISTED).enumerate();
+        for (k, numbers) in lists.skip(self.place.first_list) {
             list.fill(&blend.scene, &self.place, numbers);
             self.take((&list, numbers, k * LISTED), &mut shown, &mut block);
             self.visitor.ends(&blend.scene, &shown, k * LISTED);
@@ -65,22 +64,22 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
     }
 }
 
-impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
+impl<T: Real, V: Visitor<T>> Walk<'_, '_, '_, T, V> {
     /// Walks over the pairs of a list block by block, given the numbers of its faces in the scene and that of its first face in the band.
     #[inline(always)]
-    fn take(
+    pub(super) fn take(
         &mut self,
         (list, numbers, first): (&List<T>, &[u32], usize),
         shown: &mut Shown<T>,
         block: &mut Block<T>,
     ) {
-        let blend = self.blend;
+        let Band { blend, view, logs, .. } = self.of;
         let mut met = None;
         for (k, Chunk { places, at, owner }) in list.chunks(0).enumerate() {
             if met != Some(owner) {
-                shown.set(blend, &self.place, self.view, list.face(owner), owner, numbers[owner]);
+                shown.set(blend, &self.place, view, list.face(owner), owner, numbers[owner]);
                 shown.faces[owner % LISTED].log =
-                    Float::<T>::from_f64(f64::from(self.logs[numbers[owner] as usize]));
+                    Float::<T>::from_f64(f64::from(logs[numbers[owner] as usize]));
                 met = Some(owner);
             }
             if !self.visitor.skips(&shown.faces[owner % LISTED], at) {

@@ -4,7 +4,7 @@
 
 mod pixel;
 
-use std::{any::Any, cell::RefCell, ops::Range};
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -19,6 +19,7 @@ use super::{
     list::{LISTED, List, group},
     pair::CornerSums,
     real::splat,
+    rooms,
     scene::{BandRef, Scene},
     sum::Inputs,
     tasks::task,
@@ -88,14 +89,14 @@ fn of_views<L: Lanes>(
     let zero = L::Float::ZERO;
     let (views, pixels) = (bands.views.len(), scene.size.pixels());
     let in_band = |view: usize, band: usize| {
-        let mut room = Room::taken();
+        let mut room = rooms::taken();
         let place = scene.place(&bands.views[view], view, views, band);
         let (rows, width) = (place.rows(), scene.size.width);
         let judged = judged.part(view, pixels, rows.start * width..rows.end * width);
         let whole = bands.count == 1;
         let work = Band { scene, place, judged, loss, with_gradient, whole, room: &mut room };
         let done = task("loss of a band", || run::<L, _>(work));
-        room.leave();
+        rooms::leave(room);
         done
     };
     let count = scene.vertices.len();
@@ -166,24 +167,8 @@ struct Room<L: Lanes> {
     parts: [Vec<L::Float>; PARTS],
 }
 
-thread_local! {
-    /// The buffers of the last band of this thread: allocating them in every step takes longer than some steps.
-    static ROOM: RefCell<Option<Box<dyn Any>>> = const { RefCell::new(None) };
-}
-
-impl<L: Lanes> Room<L> {
-    /// The buffers of the last band if their float type is the same, else new ones.
-    fn taken() -> Box<Self> {
-        let last = ROOM.take().and_then(|room| room.downcast().ok());
-        last.unwrap_or_else(|| Box::new(Self::new()))
-    }
-
-    /// Returns the buffers for the next band.
-    fn leave(self: Box<Self>) {
-        ROOM.set(Some(self));
-    }
-
-    fn new() -> Self {
+impl<L: Lanes> Default for Room<L> {
+    fn default() -> Self {
         let parts = [Vec::new(), Vec::new()];
         let (kept, at, corners) = (Vec::new(), Vec::new(), Vec::new());
         let [image, target, counted] = [const { Vec::new() }; 3];

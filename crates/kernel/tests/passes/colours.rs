@@ -1,5 +1,7 @@
 //! Colour passes give the same bits with every instruction set that walks are compiled for.
 
+use std::ops::Range;
+
 use softrast_kernel::{
     Grid, ImageSize, Kernels,
     blend::{DepthGrid, Inputs},
@@ -76,7 +78,77 @@ fn passes<F: Kernels>(
     let again =
         [F::blend(&inputs, kept), F::blend_vjp(&inputs, kept, &upstream, [true; 5])].concat();
     assert!(format!("{again:?}") == format!("{:?}", &all[..again.len()]));
+    all.extend(judged(&inputs, &upstream));
     all
+}
+
+/// Losses and gradients of bands that are judged as they are drawn. The image is that of `blend`, and the gradient that of `blend_vjp` up to
+/// rounding.
+fn judged<F: Kernels>(inputs: &Inputs<F>, upstream: &[F]) -> Vec<F> {
+    let kept = &F::kept(inputs, false);
+    let image = F::blend(inputs, kept);
+    let (pixels, planes) = (inputs.size.pixels(), inputs.background.len());
+    let judge = |view: usize, rows: Range<usize>, seen: &[Vec<F>], to: &mut [Vec<F>]| {
+        let mut sum = F::ZERO;
+        for (plane, (seen, to)) in seen.iter().zip(to).enumerate() {
+            let first = (view * planes + plane) * pixels;
+            let own = first + rows.start..first + rows.end;
+            assert!(format!("{seen:?}") == format!("{:?}", &image[own.clone()]));
+            to.copy_from_slice(&upstream[own]);
+            sum += seen.iter().zip(to).fold(F::ZERO, |sum, (&a, &mut b)| sum + a * b);
+        }
+        sum
+    };
+    let wanted = [true, true, false, true, true];
+    let [losses, gradient] = F::blend_judged(inputs, kept, &judge, wanted);
+    assert_eq!(losses.len(), inputs.views);
+    let expected = F::blend_vjp(inputs, kept, upstream, wanted);
+    assert_eq!(gradient.len(), expected.len());
+    let size = |numbers: &[F]| numbers.iter().fold(0.0, |most: f64, x| most.max(x.to_f64().abs()));
+    let off: Vec<F> = gradient.iter().zip(&expected).map(|(&a, &b)| a - b).collect();
+    // The logarithm by edge is the difference of two others: rounding of the larger one remains.
+    let rounding = if size_of::<F>() == 4 { 1e-4 } else { 1e-13 };
+    assert!(size(&off) < rounding * size(&expected), "{} of {}", size(&off), size(&expected));
+    [losses, gradient].concat()
+}
+
+/// Bands with more pairs than are recorded: the rest is walked twice.
+#[test]
+fn what_is_not_recorded_is_walked_again() {
+    let edge = Grid { outer: 6.0, inner: 6.0, from: [0.0; 2], octaves: 12, far: 0, bits: 2 };
+    let mut tables =
+        edge.table(|d| [(d / 0.5).exp().ln_1p(), (1.0 + (-d / 0.5).exp()).recip() / 0.5]);
+    tables.extend([1.0, 0.0, 0.0, 0.0]);
+    // 200 faces over all of 64 x 64 pixels: some 100,000 pairs of eight pixels and a face.
+    let faces: Vec<_> = (0..200).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    let wave = |k: usize| (1.7 * k as f64).sin();
+    let vertices: Vec<f64> =
+        (0..1800).map(|k| wave(k) + if k >= 1200 { 2.5 } else { 0.0 }).collect();
+    let attributes: Vec<f64> = (0..1800).map(wave).collect();
+    let size = ImageSize::from(64);
+    let inputs = Inputs {
+        vertices: &vertices,
+        attributes: &attributes,
+        tables: &tables,
+        background: &[0.1, 0.2, 0.3, -2.0],
+        texture: &[],
+        texture_size: None,
+        faces: &faces,
+        entries: &faces,
+        edge,
+        depth: DepthGrid::Exponential,
+        floor: 0.0,
+        planes: [1.0, 4.0],
+        size,
+        near: 0.01,
+        far: 1e15,
+        tolerance: 1e-6,
+        culls: false,
+        views: 1,
+        shared: true,
+    };
+    let upstream: Vec<f64> = (0..4 * size.pixels()).map(wave).collect();
+    judged(&inputs, &upstream);
 }
 
 fn assert_same_bits<F: Kernels>() {

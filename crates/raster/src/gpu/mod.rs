@@ -68,7 +68,9 @@ impl<R: CubeRuntime, BT: BoolElement> RasterBackend for CubeBackend<R, f32, i32,
             FusedOp::ProfileSum(op) => op,
             FusedOp::SoftBlend(op) => return blended(op, pass, tensors),
             FusedOp::Elementary(op) => return elementary::run(*op, pass, tensors),
-            FusedOp::SilhouetteLoss(_) => panic!("on a GPU {op:?} is made of other ops"),
+            FusedOp::SilhouetteLoss(_) | FusedOp::BlendLoss(_) => {
+                panic!("on a GPU {op:?} is made of other ops")
+            }
         };
         let mut tensors = tensors.into_iter();
         let mut next = || tensors.next().expect("all inputs of the pass");

@@ -40,17 +40,18 @@ impl SoftBlend {
         Self { kept: Some(self.kept.clone().unwrap_or_default()), ..self.clone() }
     }
 
-    /// A pass over `vertices` `[views, 3, vertices]`, `attributes` `[1 or views, entries, numbers]`, `tables` `[rows, 4]`, `background`
-    /// `[channels + 1]` and, if there is one, a texture `[texels, 4]`, to an image `[views, channels + 1, height, width]`, top row first.
-    pub(crate) fn run<F: Kernels + Element>(
-        &self,
-        pass: &Pass,
-        slices: &[&[F]],
+    /// Number of the inputs: [`run`](Self::run) names them.
+    pub(crate) fn inputs_count(&self) -> usize {
+        4 + usize::from(self.texture.is_some())
+    }
+
+    /// The inputs of the kernel.
+    pub(crate) fn inputs<'a, F>(
+        &'a self,
+        slices: &[&'a [F]],
         dims: &[Vec<usize>],
-    ) -> TensorData {
-        let (views, channels) = (dims[0][0], dims[3][0] - 1);
-        let count = 4 + usize::from(self.texture.is_some());
-        let inputs = Inputs {
+    ) -> Inputs<'a, F> {
+        Inputs {
             vertices: slices[0],
             attributes: slices[1],
             tables: slices[2],
@@ -68,9 +69,22 @@ impl SoftBlend {
             far: FARTHEST_SEEN,
             tolerance: self.tolerance,
             culls: self.culls,
-            views,
+            views: dims[0][0],
             shared: dims[1][0] == 1,
-        };
+        }
+    }
+
+    /// A pass over `vertices` `[views, 3, vertices]`, `attributes` `[1 or views, entries, numbers]`, `tables` `[rows, 4]`, `background`
+    /// `[channels + 1]` and, if there is one, a texture `[texels, 4]`, to an image `[views, channels + 1, height, width]`, top row first.
+    pub(crate) fn run<F: Kernels + Element>(
+        &self,
+        pass: &Pass,
+        slices: &[&[F]],
+        dims: &[Vec<usize>],
+    ) -> TensorData {
+        let (views, channels) = (dims[0][0], dims[3][0] - 1);
+        let count = self.inputs_count();
+        let inputs = self.inputs(slices, dims);
         let own = OnceLock::new();
         let kept = self.kept.as_deref().unwrap_or(&own);
         let kept = kept.get_or_init(|| Box::new(F::kept(&inputs, self.kept.is_some())));

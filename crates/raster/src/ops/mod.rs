@@ -4,6 +4,7 @@
 //! would be a hundred small tensor ops, which take longer than the rasterizer.
 
 pub(crate) mod blend;
+pub(crate) mod blend_loss;
 pub(crate) mod elementary;
 pub(crate) mod loss;
 pub(crate) mod pass;
@@ -13,6 +14,7 @@ use softrast_kernel::Kernels;
 use softrast_tensor::{Element, TensorData};
 
 use blend::SoftBlend;
+use blend_loss::BlendLoss;
 pub use elementary::ElementaryOp;
 use elementary::Number;
 use loss::SilhouetteLoss;
@@ -29,6 +31,9 @@ pub enum FusedOp {
     /// See [`crate::ColourRenderer`].
     #[doc(hidden)]
     SoftBlend(SoftBlend),
+    /// See [`crate::ColourRenderer::mse_loss`].
+    #[doc(hidden)]
+    BlendLoss(BlendLoss),
     /// See [`crate::SoftRenderer::mse_loss`].
     #[doc(hidden)]
     SilhouetteLoss(SilhouetteLoss),
@@ -55,6 +60,7 @@ impl FusedOp {
         match self {
             Self::ProfileSum(op) => Self::ProfileSum(op.keeping()),
             Self::SoftBlend(op) => Self::SoftBlend(op.keeping()),
+            Self::BlendLoss(op) => Self::BlendLoss(op.keeping()),
             Self::SilhouetteLoss(op) => Self::SilhouetteLoss(op.keeping()),
             Self::Elementary(op) => Self::Elementary(*op),
         }
@@ -87,6 +93,7 @@ where
     match op {
         FusedOp::ProfileSum(op) => op.run(pass, slices, dims),
         FusedOp::SoftBlend(op) => op.run(pass, slices, dims),
+        FusedOp::BlendLoss(op) => op.run(pass, slices, dims),
         FusedOp::SilhouetteLoss(op) => op.run(pass, slices, dims),
         FusedOp::Elementary(op) => op.run(pass, slices, dims),
     }

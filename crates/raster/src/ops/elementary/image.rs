@@ -71,7 +71,7 @@ fn mapped<A: Copy + Sync, B: Copy + Sync, N: Number>(
 }
 
 /// Sums `of` over pairs, in a fixed order that does not depend on the number of threads.
-fn summed<N: Number, const K: usize>(
+pub(crate) fn summed<N: Number, const K: usize>(
     a: &[N],
     b: &[N],
     of: impl Fn(N, N) -> [N; K] + Sync,

@@ -8,6 +8,7 @@ mod op;
 use softrast_kernel::{Dual, Float};
 use softrast_tensor::{Element, TensorData};
 
+pub(crate) use image::summed;
 pub(crate) use number::Number;
 pub use op::ElementaryOp;
 pub(crate) use op::dual_upstream;
