@@ -56,6 +56,8 @@ def load(path):
             ids = [int(word.split("/")[0]) for word in words[1:]]
             ids = [k - 1 if k > 0 else k + len(points) for k in ids]
             faces += [[ids[0], *pair] for pair in zip(ids[1:], ids[2:])]
+    if not faces:
+        raise SystemExit(f"{path} has no faces of an OBJ file: masks are drawn of OBJ files alone")
     points = np.array(points)
     low, high = points.min(0), points.max(0)
     return ((points - (low + high) / 2) * 2 / (high - low).max())[np.array(faces)]

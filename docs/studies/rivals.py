@@ -1,4 +1,4 @@
-"""Times a step of softrast or of another rasterizer: image, squared error to a disk, gradient to the world vertices, in float32.
+"""Times a step of softrast or of another rasterizer: image, squared error to a disk, gradient to the world vertices, in float32 (deodr in float64).
 
     python docs/studies/rivals.py CODE [--spot FILE.obj] [--device cpu|cuda] [--threads N] [--steps N] [--warm-up N]
 

@@ -60,7 +60,11 @@ pub trait Kernels: Float {
     ) -> Vec<Self>;
 
     /// Losses `[views]` of the image, as `judge` finds them, and the gradients of their sum with respect to the inputs that are wanted, as by
-    /// [`Kernels::blend_vjp`]; tables have none.
+    /// [`Kernels::blend_vjp`].
+    ///
+    /// # Panics
+    ///
+    /// If the gradient of the tables is wanted.
     fn blend_judged(
         inputs: &blend::Inputs<Self>,
         kept: &Kept<Self>,

@@ -127,16 +127,19 @@ fn assert_close(found: &[f64], expected: &[f64], of: &str) {
 /// Exponential edges, and edges with a floor; colours, shared and by view, and a texture; all gradients, and those of vertices alone; factors
 /// that agree, and that differ.
 #[test]
-fn one_op_is_two() {
+fn one_op_gives_the_losses_and_gradients_of_two() {
     let logistic = || Case::new(3, EdgeSoftness::new(Family::Logistic), 0.03);
     let ends = || Case::new(4, EdgeSoftness::new(Family::CubicHermite), 0.2);
     let heavy = || Case::new(5, EdgeSoftness::new(Family::Cauchy), 0.02);
+    let mut front = logistic();
+    front.renderer = front.renderer.without_back_faces();
     let cases = [
         ("logistic", logistic()),
         ("by view", Case { shared: false, ..logistic() }),
         ("one channel", Case { channels: 1, ..ends() }),
         ("texture", Case { texture: Some([5, 7]), ..ends() }),
         ("heavy", heavy()),
+        ("front faces", front),
     ];
     for (name, case) in &cases {
         let tracked = vec![true; case.inputs::<B>().len()];
@@ -146,6 +149,7 @@ fn one_op_is_two() {
                 ([1.0; VIEWS], 1, case.channels),
                 ([0.25; VIEWS], VIEWS, case.channels + 1),
                 ([0.5, -2.0, 0.0], VIEWS, case.channels),
+                ([1.0, 0.0, 3.0], 1, case.channels),
             ] {
                 let target = target(views, planes);
                 let [found, expected] = [true, false]
@@ -158,7 +162,7 @@ fn one_op_is_two() {
 
 /// The second order, and the gradient of the target, are those of two ops.
 #[test]
-fn what_one_op_does_not_give_two_give() {
+fn second_orders_and_gradients_of_targets_are_those_of_two_ops() {
     let case = Case::new(6, EdgeSoftness::new(Family::Logistic), 0.05);
     let curvature = |at_once: bool| {
         let inputs: Vec<Tensor<Autodiff<A>, 1>> = case

@@ -91,8 +91,7 @@ impl<T: Real> Block<T> {
         });
     }
 
-    /// Computes everything but the slopes by edge, which are known, for visitors with gradients. The logarithms by edge are those of weights
-    /// before, and those of edge softnesses after.
+    /// Computes everything but the logarithms and slopes by edge, which are known, for visitors with gradients.
     #[inline(always)]
     pub(super) fn locate(&mut self, blend: &Blend<T>, list: &List<T>, shown: &Shown<T>) {
         let of = Locate { blend, list, shown, block: self };
@@ -183,10 +182,6 @@ impl<T: Real, const SLIVERS: bool> Work for Relocate<'_, '_, T, SLIVERS> {
         }
         of.locate();
         of.weigh();
-        let block = of.block;
-        for k in 0..block.count.min(BLOCK) {
-            block.log_edge[k] = block.log_edge[k] - block.log_depth[k];
-        }
     }
 }
 

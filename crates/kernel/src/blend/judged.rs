@@ -15,23 +15,25 @@ use crate::{
     float::Float as _,
     lanes::{Lanes, Work, run},
     list::{Chunk, LISTED, List},
+    real::splat,
     rooms,
 };
 
 /// Compares pixels of a view with what they should be: given the view, its pixels, and their image `[channels + 1][pixels]`, returns their
-/// share of the loss of the view, and writes its derivatives with respect to the image.
+/// share of the loss of the view, and writes its derivatives with respect to the image over zeros. Several threads call it, each for other
+/// pixels.
 pub type Judge<'a, F> = dyn Fn(usize, Range<usize>, &[Vec<F>], &mut [Vec<F>]) -> F + Sync + 'a;
 
-/// Most chunks recorded per band, of 82 bytes in f32 and 146 in f64. Lists beyond that are walked twice.
+/// Most chunks recorded per band, of 82 bytes in f32 and 146 in f64: some 3 or 5 MB per thread. Lists beyond that are walked twice.
 const RECORDED: usize = 1 << 15;
 
-/// What the gradient needs of eight pixels and a face, and would have to look up again. Geometry is computed again: to read it from memory
-/// takes longer.
+/// Numbers of eight pixels and a face that the gradient would have to look up again. Geometry is computed again: to read it from memory takes
+/// longer.
 #[derive(Clone, Copy)]
 struct Record<L> {
-    /// Logarithm of the weight.
-    log: L,
-    /// The derivative of the logarithm of the edge softness with respect to the squared distance.
+    /// Logarithm of the edge softness.
+    log_edge: L,
+    /// Its derivative with respect to the squared distance.
     slope: L,
 }
 
@@ -50,13 +52,13 @@ impl<L: Lanes> Default for Records<L> {
 }
 
 /// A band, its loss, and its gradients that are wanted; those of tables are not available.
-pub(super) struct Judged<'a, 's, L: Lanes> {
+pub(super) struct JudgedBand<'a, 's, L: Lanes> {
     pub(super) of: Band<'a, 's, L>,
     pub(super) judge: &'a Judge<'a, L::Float>,
     pub(super) wanted: [bool; 5],
 }
 
-impl<L: Lanes> Work for Judged<'_, '_, L> {
+impl<L: Lanes> Work for JudgedBand<'_, '_, L> {
     type Output = Walked<L::Float>;
 
     #[inline(always)]
@@ -113,6 +115,7 @@ impl<L: Lanes> Work for Draw<'_, '_, '_, '_, L> {
             let list = &mut lists[k];
             list.fill(&of.blend.scene, &place, numbers);
             if walk.visitor.pairs.len() + list.len() > RECORDED {
+                lists.truncate(k);
                 break;
             }
             walk.take((list, numbers, k * LISTED), &mut shown, &mut block);
@@ -134,13 +137,12 @@ impl<L: Lanes> Visitor<L> for Recorder<'_, '_, L> {
     fn take(&mut self, blend: &Blend<L>, shown: &Shown<L>, block: &Block<L>, first: usize) {
         self.sums.take(blend, shown, block, first);
         for k in 0..block.count.min(BLOCK) {
-            let log = block.log_edge[k] + block.log_depth[k];
-            self.pairs.push(Record { log, slope: block.edge_slope[k] });
+            self.pairs.push(Record { log_edge: block.log_edge[k], slope: block.edge_slope[k] });
         }
     }
 }
 
-/// Visits the recorded pairs that count at some pixel.
+/// Visits the recorded pairs, except those that are negligible at the nearest corner of their face.
 struct Replay<'a, 's, 'v, 'w, L: Lanes> {
     of: Band<'a, 's, L>,
     records: &'v Records<L>,
@@ -153,7 +155,7 @@ impl<L: Lanes> Work for Replay<'_, '_, '_, '_, L> {
     #[inline(always)]
     fn run(self) {
         let Self { of, records: Records { lists, count, pairs }, pull } = self;
-        let Band { blend, view, .. } = of;
+        let Band { blend, view, logs, .. } = of;
         let place = of.place();
         let mut shown = Shown::new(blend.numbers);
         let mut block = Block::nothing();
@@ -162,17 +164,21 @@ impl<L: Lanes> Work for Replay<'_, '_, '_, '_, L> {
         for (k, (list, numbers)) in lists.enumerate() {
             let own;
             (own, rest) = rest.split_at(list.len());
-            let mut met = None;
+            let (mut met, mut shows, mut highest) = (None, false, splat::<L>(0.0));
             let chunks = list.chunks(0).zip(own).zip(1..);
-            for ((Chunk { places, at, owner }, &Record { log, slope }), so_far) in chunks {
-                if pull.counts(at, log) {
-                    if met != Some(owner) {
+            for ((Chunk { places, at, owner }, &Record { log_edge, slope }), so_far) in chunks {
+                if met != Some(owner) {
+                    highest = splat(f64::from(logs[numbers[owner] as usize]));
+                    (met, shows) = (Some(owner), false);
+                }
+                if pull.counts(at, log_edge + highest) {
+                    if !shows {
                         shown.set(blend, &place, view, list.face(owner), owner, numbers[owner]);
-                        met = Some(owner);
+                        shows = true;
                     }
                     let slot = block.count % BLOCK;
                     (block.at[slot], block.places[slot], block.owner[slot]) = (at, *places, owner);
-                    (block.log_edge[slot], block.edge_slope[slot]) = (log, slope);
+                    (block.log_edge[slot], block.edge_slope[slot]) = (log_edge, slope);
                     block.count = slot + 1;
                 }
                 if block.count == BLOCK || so_far == list.len() {

@@ -67,7 +67,7 @@ use rayon::prelude::*;
 
 use self::{
     band::{Band, BandSums, Drawn, Walked},
-    judged::Judged,
+    judged::JudgedBand,
     pull::CORNER_NUMBERS,
     reach::Reached,
     scene::Blend,
@@ -243,7 +243,7 @@ fn of_judged<L: Lanes>(
 ) -> [Vec<L::Float>; 2] {
     let blend = inputs.blend([&[]; 5]);
     let mut passed = passes(inputs, &blend, kept, Some(wanted), |of: Band<L>| {
-        task("loss of a band", || run::<L, _>(Judged { of, judge, wanted }))
+        task("loss of a band", || run::<L, _>(JudgedBand { of, judge, wanted }))
     });
     [std::mem::take(&mut passed.losses), passed.gradient(wanted)]
 }

@@ -67,7 +67,7 @@ impl<B: RasterBackend> Call<B> {
         let tracked: Vec<bool> = self.inputs.iter().map(B::is_tracked).collect();
         let wanted: [bool; 5] =
             std::array::from_fn(|k| tracked.get(k).is_some_and(|&tracked| tracked));
-        if !B::ON_HOST || B::ORDERS != 1 || wanted[2] || B::is_tracked(&target) {
+        if !B::ON_HOST || B::ORDERS != 1 || B::is_tracked(&target) {
             return None;
         }
         wanted.contains(&true).then(|| {

@@ -1,4 +1,7 @@
-use std::sync::{Arc, OnceLock};
+use std::{
+    ops::Range,
+    sync::{Arc, OnceLock},
+};
 
 use softrast_kernel::{Kernels, blend::Inputs};
 use softrast_tensor::{Element, TensorData};
@@ -10,6 +13,9 @@ use crate::{
         pass::Pass,
     },
 };
+
+/// Pixels that are added up together, few enough for one task: bands are tasks already.
+const AT_ONCE: usize = 4096;
 
 /// The squared error of images in colour relative to a target, in one op: the forward pass also computes its gradient. Differentiable once.
 #[derive(Clone, Debug)]
@@ -25,7 +31,7 @@ impl BlendLoss {
     /// The op of a call whose passes share a cache.
     pub(crate) fn keeping(&self) -> Self {
         let kept = Some(self.kept.clone().unwrap_or_default());
-        Self { blend: self.blend.keeping(), kept, ..self.clone() }
+        Self { kept, ..self.clone() }
     }
 
     /// A pass over the inputs of the [`SoftBlend`] and a target `[1 or views, planes, height, width]`, to losses `[views]`: the first planes
@@ -74,26 +80,27 @@ impl BlendLoss {
         upstream: Option<&[F]>,
     ) -> [Vec<F>; 2] {
         let part = F::ONE / F::from_f64(target.of_view() as f64);
-        let judge =
-            |view: usize, pixels: std::ops::Range<usize>, image: &[Vec<F>], to: &mut [Vec<F>]| {
-                let factor = part * upstream.map_or(F::ONE, |upstream| upstream[view]);
-                let factor = factor + factor;
-                let mut loss = F::ZERO;
-                for (plane, (drawn, to)) in image.iter().zip(to).enumerate().take(target.shape[1]) {
-                    let wanted = &target.plane(view, plane)[pixels.clone()];
+        let judge = |view: usize, pixels: Range<usize>, image: &[Vec<F>], to: &mut [Vec<F>]| {
+            let factor = part * upstream.map_or(F::ONE, |upstream| upstream[view]);
+            let factor = factor + factor;
+            let mut loss = F::ZERO;
+            for (plane, (drawn, to)) in image.iter().zip(to).enumerate().take(target.shape[1]) {
+                let wanted = &target.plane(view, plane)[pixels.clone()];
+                for (drawn, wanted) in drawn.chunks(AT_ONCE).zip(wanted.chunks(AT_ONCE)) {
                     let [sum] = summed(drawn, wanted, |a: F, b: F| [(a - b) * (a - b)]);
                     loss += sum * part;
-                    for (to, (&a, &b)) in to.iter_mut().zip(drawn.iter().zip(wanted)) {
-                        *to = (a - b) * factor;
-                    }
                 }
-                loss
-            };
+                for (to, (&a, &b)) in to.iter_mut().zip(drawn.iter().zip(wanted)) {
+                    *to = (a - b) * factor;
+                }
+            }
+            loss
+        };
         F::blend_judged(inputs, &F::kept(inputs, false), &judge, self.wanted)
     }
 }
 
-/// What images are compared with.
+/// The target of a loss.
 #[derive(Clone, Copy)]
 struct Target<'a, F> {
     numbers: &'a [F],

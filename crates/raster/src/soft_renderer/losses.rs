@@ -10,7 +10,7 @@ impl<S: Softness> SoftRenderer<S> {
     /// `[1 or views, height, width]`, `[views]`. Gradients reach only the vertices, to second order.
     ///
     /// On the CPU, with the probabilistic sum and without a surrogate, it is one op that computes the gradient together with the image. It
-    /// takes two thirds to nine tenths of the time of two ops.
+    /// takes seven to eight tenths of the time of two ops.
     ///
     /// # Panics
     ///
