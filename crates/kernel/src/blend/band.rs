@@ -6,13 +6,12 @@ use std::{ops::Range, sync::OnceLock};
 use super::{
     pull::{CORNER_NUMBERS, Pull},
     quads::{QUAD, Quads},
-    scene::{Blend, of_type},
+    scene::{Band, of_type},
     sums::{Largest, Sums},
     texture::TexelSums,
     walk::{Visitor, Walk},
 };
 use crate::{
-    bands::View,
     float,
     lanes::{LANES, Lanes, Work, run},
     real::{Float, Real, splat},
@@ -40,20 +39,6 @@ pub(super) struct Walked<F> {
     pub(super) tables: [Vec<[F; 4]>; 2],
     pub(super) background: Vec<F>,
     pub(super) texels: TexelSums<F>,
-}
-
-/// One band of one view.
-#[derive(Clone, Copy)]
-pub(super) struct Band<'a, 's, T: Real> {
-    pub(super) blend: &'a Blend<'s, T>,
-    pub(super) of_view: &'a View,
-    pub(super) views: usize,
-    pub(super) view: usize,
-    pub(super) band: usize,
-    /// Logarithm of the largest depth weight of each face.
-    pub(super) logs: &'a [f32],
-    /// Logarithm of the relative weight below which a face is culled at a pixel.
-    pub(super) least: f64,
 }
 
 /// The image of a band, or the gradient of `Σ upstream · image`, and of dual numbers both.

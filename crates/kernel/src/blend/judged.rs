@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::{
-    band::{Band, Walked},
+    band::Walked,
     block::{BLOCK, Block},
     pull::Pull,
-    scene::Blend,
+    scene::{Band, Blend},
     shown::Shown,
     sums::Sums,
     walk::{Visitor, Walk},

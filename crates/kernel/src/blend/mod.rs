@@ -66,11 +66,11 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use self::{
-    band::{Band, BandSums, Drawn, Walked},
+    band::{BandSums, Drawn, Walked},
     judged::JudgedBand,
     pull::CORNER_NUMBERS,
     reach::Reached,
-    scene::Blend,
+    scene::{Band, Blend},
     texture::TexelSums,
 };
 pub use self::{

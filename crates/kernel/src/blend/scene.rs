@@ -6,7 +6,9 @@ use super::{
     texture::{TexelSums, Texture},
 };
 use crate::{
-    ImageSize, float,
+    ImageSize,
+    bands::View,
+    float,
     lanes::Lanes,
     real::{Float, Real, Table, everywhere},
     scene::Scene,
@@ -176,4 +178,18 @@ impl<T: Real> Blend<'_, T> {
     pub(super) fn behind(&self, channel: usize) -> T {
         everywhere(self.background[0], self.background[1], channel)
     }
+}
+
+/// One band of one view.
+#[derive(Clone, Copy)]
+pub(super) struct Band<'a, 's, T: Real> {
+    pub(super) blend: &'a Blend<'s, T>,
+    pub(super) of_view: &'a View,
+    pub(super) views: usize,
+    pub(super) view: usize,
+    pub(super) band: usize,
+    /// Logarithm of the largest depth weight of each face.
+    pub(super) logs: &'a [f32],
+    /// Logarithm of the relative weight below which a face is culled at a pixel.
+    pub(super) least: f64,
 }

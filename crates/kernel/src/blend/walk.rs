@@ -4,9 +4,8 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::{
-    band::Band,
     block::{BLOCK, Block},
-    scene::Blend,
+    scene::{Band, Blend},
     shown::{FaceAttributes, Shown},
 };
 use crate::{
