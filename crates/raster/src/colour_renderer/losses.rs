@@ -9,7 +9,7 @@ impl<S: Softness> ColourRenderer<S> {
     /// or with one channel more, the faces' share.
     ///
     /// On the CPU, to first order, it is one op that computes the gradient together with the image: on `Autodiff<B>` where the target has
-    /// no gradient. A step takes 2 to 16 % less time so, but more if views have different weights: their gradient is drawn anew.
+    /// no gradient. A step takes up to 16 % less time so, but more if views have different weights: their gradient is drawn anew.
     ///
     /// ```
     /// use softrast_raster::{Attributes, ColourRenderer, HostBackend, Projected, vertex_tensor};
