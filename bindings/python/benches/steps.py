@@ -1,10 +1,11 @@
-"""A step of an optimisation, float32: projection, image, mean squared difference (by `st.mse_loss`, or by ops of torch), gradient to the vertices.
+"""A step of an optimisation, float32: projection, image, mean squared difference, gradient to the vertices.
 
-`python bindings/python/benches/steps.py [--mesh W2_MESH.obj] [--rust target/release/examples/step] [--loss torch]`, in an environment with the wheel and torch.
+`python bindings/python/benches/steps.py [--mesh W2_MESH.obj] [--rust target/release/examples/step] [--torch-loss]`, in an environment with the wheel and torch.
 
-W1 is a sphere of 1,280 faces in 24 views of 64 x 64; with a mesh it is W2, one view of 256 x 256. With the path of the example `step` the step
-in Rust is timed in turn with ours, so that both have the same neighbours on the machine; else, beside W1, the published formula
-`1 - prod(1 - sigmoid(-dists / sigma))` in plain torch ops, over all pairs of pixel and face. The last line is of the same step under
+Image and loss are two ops (`st.silhouette`, `st.mse_loss`; with `--torch-loss` the loss is by ops of torch) or one (`st.silhouette_loss`). W1 is a
+sphere of 1,280 faces in 24 views of 64 x 64; with a mesh it is W2, one view of 256 x 256. With the path of the example `step` both steps in Rust
+are timed in turn with ours, so that all have the same neighbours on the machine; else, beside W1, the published formula
+`1 - prod(1 - sigmoid(-dists / sigma))` in plain torch ops, over all pairs of pixel and face. The last lines are of the same steps under
 `torch.compile(fullgraph=True)`, in turn with eager mode.
 """
 
@@ -21,7 +22,7 @@ import softrast.torch as st
 parser = argparse.ArgumentParser()
 parser.add_argument("--mesh")
 parser.add_argument("--rust")
-parser.add_argument("--loss", choices=["softrast", "torch"], default="softrast")
+parser.add_argument("--torch-loss", action="store_true")
 given = parser.parse_args()
 
 SIGMA = 1e-4
@@ -64,27 +65,26 @@ corners = torch.from_numpy(faces)
 target = torch.zeros(VIEWS, SIZE, SIZE)
 
 
-def loss(vertices):
+def two_ops(vertices):
     image = st.silhouette(renderer, st.project(vertices, cameras))
-    return (st.mse_loss(image, target) if given.loss == "softrast" else (image - target).pow(2)).mean()
+    return ((image - target).pow(2) if given.torch_loss else st.mse_loss(image, target)).mean()
 
 
-def ours():
+def one_op(vertices):
+    return st.silhouette_loss(renderer, st.project(vertices, cameras), target).mean()
+
+
+def step(loss):
     vertices.grad = None
     loss(vertices).backward()
 
 
-def compare_compiled():
+def compare_compiled(name, loss):
     start, compiled = time.perf_counter(), torch.compile(loss, fullgraph=True)
-
-    def step():
-        vertices.grad = None
-        compiled(vertices).backward()
-
-    step()
+    step(compiled)
     spent = time.perf_counter() - start
-    ratios = [median(step, 100) / median(ours, 100) for _ in range(7)]
-    print(f"compiled in {spent:.1f} s; ratio to eager mode, round by round:", *(f"{ratio:.2f}" for ratio in ratios))
+    ratios = [median(lambda: step(compiled), 100) / median(lambda: step(loss), 100) for _ in range(7)]
+    print(f"{name}, compiled in {spent:.1f} s; ratio to eager mode, round by round:", *(f"{ratio:.2f}" for ratio in ratios))
 
 
 def theirs_of_one_view():
@@ -93,21 +93,25 @@ def theirs_of_one_view():
     (image - target[0]).pow(2).mean().backward()
 
 
-median(ours, 20)
-rounds = []
-rust = [given.rust, *([given.mesh] if given.mesh else [])] if given.rust else None
+losses = {"two ops": two_ops, "one op": one_op}
+for loss in losses.values():
+    median(lambda: step(loss), 20)
+rounds, rust = [], given.rust and [given.rust, *([given.mesh] if given.mesh else [])]
 for _ in range(7 if rust else 1):
-    theirs = rust and float(subprocess.run(rust, stdout=subprocess.PIPE, text=True, check=True).stdout.split()[1])
-    rounds.append((1e3 * median(ours, 200), theirs))
-steps = [step for step, _ in rounds]
-print(f"softrast {np.median(steps):.2f} ms")
-if rust:
-    print("Rust {:.2f} ms; ratio, round by round:".format(np.median([theirs for _, theirs in rounds])), *(f"{a / b:.2f}" for a, b in rounds))
-elif not given.mesh:
+    theirs = subprocess.run(rust, stdout=subprocess.PIPE, text=True, check=True).stdout if rust else ""
+    ours = [1e3 * median(lambda: step(loss), 200) for loss in losses.values()]
+    rounds.append([*ours, *map(float, theirs.split())])
+medians = np.median(rounds, 0)
+for k, name in enumerate(losses):
+    print(f"{name}: {medians[k]:.2f} ms")
+    if rust:
+        print(f"  Rust {medians[k + 2]:.2f} ms; ratio, round by round:", *(f"{times[k] / times[k + 2]:.2f}" for times in rounds))
+if not rust and not given.mesh:
     with torch.no_grad():
         seen = st.project(vertices, cameras[:1])
         difference = (st.silhouette(renderer, seen)[0] - formula(seen[0], corners)).abs().max()
     print(f"largest difference of a pixel {difference:.1e}")
     plain = VIEWS * median(theirs_of_one_view, 2)
-    print(f"the formula in torch ops, 24 times one view, {plain:.1f} s; ratio {1e3 * plain / np.median(steps):.0f}")
-compare_compiled()
+    print(f"the formula in torch ops, 24 times one view, {plain:.1f} s; ratio {1e3 * plain / medians[0]:.0f}")
+for name, loss in losses.items():
+    compare_compiled(name, loss)

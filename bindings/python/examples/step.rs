@@ -1,4 +1,5 @@
-//! The step that `benches/steps.py` times, in Rust: `cargo run --release --example step -- [W2_MESH.obj]`. Without a mesh it is W1.
+//! The steps that `benches/steps.py` times, in Rust: `cargo run --release --example step -- [W2_MESH.obj]`. Without a mesh it is W1.
+//! Prints the milliseconds with image and loss as two ops, and as one.
 
 use std::time::Instant;
 
@@ -22,16 +23,24 @@ fn main() {
     let softness = EdgeSoftness::squared(Family::Logistic);
     let renderer = SoftRenderer::new(mesh.faces(), size, softness, 1e-4);
     let target = Tensor::<B, 3>::zeros([azimuths.len(), size, size], &device);
-    let mut times = Vec::new();
-    for _ in 0..220 {
-        let corners = vertex_tensor::<B>(mesh.positions(), &device).require_grad();
+    let [mut two, mut one] = [Vec::new(), Vec::new()];
+    for k in 0..440 {
+        let (corners, whole) =
+            (vertex_tensor::<B>(mesh.positions(), &device).require_grad(), k % 2 == 1);
         let start = Instant::now();
-        let image = renderer.silhouette(project(corners.clone(), cameras.clone()));
-        let gradients = mse_loss(image, target.clone()).mean().backward();
-        assert!(corners.grad(&gradients).is_some());
-        times.push(start.elapsed().as_secs_f64());
+        let seen = project(corners.clone(), cameras.clone());
+        let losses = if whole {
+            renderer.mse_loss(seen, target.clone())
+        } else {
+            mse_loss(renderer.silhouette(seen), target.clone())
+        };
+        assert!(corners.grad(&losses.mean().backward()).is_some());
+        (if whole { &mut one } else { &mut two }).push(1e3 * start.elapsed().as_secs_f64());
     }
-    let times = &mut times[20..];
-    times.sort_by(f64::total_cmp);
-    println!("Rust {:.2} ms", 1e3 * times[times.len() / 2]);
+    let [two, one] = [two, one].map(|mut times| {
+        times.drain(..20);
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    });
+    println!("{two:.3} {one:.3}");
 }

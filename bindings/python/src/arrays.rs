@@ -1,6 +1,9 @@
 //! Arrays of either float type, as frameworks hand them in and get them back.
 
-use std::{borrow::Cow, ops::Add};
+use std::{
+    borrow::Cow,
+    ops::{Add, Mul},
+};
 
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -32,7 +35,9 @@ pub(crate) struct View<'a, F> {
 }
 
 /// float32 or float64.
-pub(crate) trait Float: Numbers + numpy::Element + Add<Output = Self> {
+pub(crate) trait Float:
+    Numbers + numpy::Element + Add<Output = Self> + Mul<Output = Self>
+{
     /// Numbers of any type as those of this one, if they are.
     fn of<'a>(floats: &'a Floats<'_>) -> Option<&'a [Self]>;
     /// Numbers of this type as those of any.

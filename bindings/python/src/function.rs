@@ -12,6 +12,7 @@ use softrast_raster::low_level::ElementaryOp;
 use crate::{
     arrays::{Array, Borrowed, Float, Floats, View},
     guard::refused,
+    losses::Losses,
     op::Op,
     passes::{Blends, Directions, Found, Inputs, Silhouettes},
 };
@@ -32,6 +33,8 @@ enum Kind {
     Op(Op, &'static [usize], bool),
     /// Vertices `[views, 3, V]` and, unless it is the renderer's own, φ `[P]` to coverage and the sums.
     Silhouette(Arc<Silhouettes>, bool),
+    /// See [`Losses`].
+    Loss(Losses),
     /// See [`Blends`].
     Blend(Box<Blends>),
 }
@@ -110,6 +113,10 @@ impl Function {
     /// Silhouettes under the φ of the renderer, or under a φ that is given.
     pub(crate) fn silhouette(of: Arc<Silhouettes>, own: bool) -> Self {
         Self::new(Kind::Silhouette(of, own))
+    }
+
+    pub(crate) fn loss(of: Losses) -> Self {
+        Self::new(Kind::Loss(of))
     }
 
     pub(crate) fn blend(of: Blends) -> Self {
@@ -257,6 +264,7 @@ impl Kind {
                     &[3, 1]
                 }
             }
+            Self::Loss(_) => &[3, 3],
             Self::Blend(of) => {
                 if of.has_texture() {
                     &[3, 3, 1, 1, 2]
@@ -268,21 +276,21 @@ impl Kind {
     }
 
     fn keeps(&self) -> usize {
-        matches!(self, Self::Silhouette(..)).into()
+        matches!(self, Self::Silhouette(..) | Self::Loss(_)).into()
     }
 
     fn views(&self) -> bool {
         match self {
             Self::Op(_, _, views) => *views,
             Self::Silhouette(_, own) => *own,
-            Self::Blend(_) => false,
+            Self::Loss(_) | Self::Blend(_) => false,
         }
     }
 
     /// The place of φ among the inputs.
     fn phi(&self) -> Option<usize> {
         match self {
-            Self::Op(..) | Self::Silhouette(_, true) => None,
+            Self::Op(..) | Self::Silhouette(_, true) | Self::Loss(_) => None,
             Self::Silhouette(_, false) => Some(1),
             Self::Blend(_) => Some(Blends::PHI),
         }
@@ -376,8 +384,13 @@ impl Kind {
             _ => {
                 let mut values = self.forward(&given, order == Order::Value)?;
                 values.truncate(if order == Order::Image { 1 } else { values.len() });
-                let array = |values| Array { dims: dims.clone(), numbers: F::any(values) };
-                return Ok(values.into_iter().map(array).collect());
+                // Sums have the shape of the value, gradients of losses that of the vertices.
+                let kept = if let Self::Loss(_) = self { &given.views[0].dims } else { &dims };
+                let array = |(values, dims): (Vec<F>, &Vec<usize>)| Array {
+                    dims: dims.clone(),
+                    numbers: F::any(values),
+                };
+                return Ok(values.into_iter().zip([&dims, kept]).map(array).collect());
             }
         };
         let last = found.views.len() - 1;
@@ -404,6 +417,7 @@ impl Kind {
                 op.shape(&views.iter().map(|view| view.dims.clone()).collect::<Vec<_>>())
             }
             Self::Silhouette(of, _) => Ok(of.dims(&views[0])),
+            Self::Loss(of) => of.dims(views),
             Self::Blend(of) => Ok(of.dims(views)),
         }
     }
@@ -416,6 +430,7 @@ impl Kind {
         match self {
             Self::Op(op, ..) => Ok(vec![op.forward(&inputs.views)?]),
             Self::Silhouette(of, _) => of.forward(inputs, keeps),
+            Self::Loss(of) => of.forward(&inputs.views, keeps),
             Self::Blend(of) => of.forward(inputs, keeps),
         }
     }
@@ -429,11 +444,14 @@ impl Kind {
     ) -> Result<Found<F>, String> {
         match (self, kept) {
             (Self::Silhouette(of, _), Some(kept)) => of.vjp(inputs, kept, upstream, wanted),
+            (Self::Loss(of), Some(kept)) => {
+                Ok(Found { views: of.vjp(&inputs.views, kept, upstream, wanted)?, phi: None })
+            }
             (Self::Blend(of), _) => of.vjp(inputs, upstream, wanted),
             (Self::Op(op, ..), _) => {
                 Ok(Found { views: op.vjp(&inputs.views, upstream, wanted)?, phi: None })
             }
-            _ => Err("the sums are missing".to_owned()),
+            _ => Err("what is kept is missing".to_owned()),
         }
     }
 
@@ -449,12 +467,16 @@ impl Kind {
             (Self::Silhouette(of, _), Some(kept)) => {
                 of.vjp_of_vjp(inputs, kept, upstream, directions, wanted)
             }
+            (Self::Loss(of), _) => {
+                let views = of.vjp_of_vjp(&inputs.views, upstream, &directions.views, wanted)?;
+                Ok(Found { views, phi: None })
+            }
             (Self::Blend(of), _) => of.vjp_of_vjp(inputs, upstream, &directions, wanted),
             (Self::Op(op, ..), _) => {
                 let views = op.vjp_of_vjp(&inputs.views, upstream, &directions.views, wanted)?;
                 Ok(Found { views, phi: None })
             }
-            _ => Err("the sums are missing".to_owned()),
+            _ => Err("what is kept is missing".to_owned()),
         }
     }
 }

@@ -11,6 +11,7 @@ mod function;
 mod guard;
 mod knots;
 mod learn;
+mod losses;
 mod meshes;
 mod op;
 mod passes;

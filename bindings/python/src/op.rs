@@ -22,13 +22,23 @@ pub(crate) struct Op(Arc<Kind>);
 #[derive(Clone)]
 enum Kind {
     /// Vertices `[views, 3, V]` and a table to sums `[views, height, width]`.
-    Sum { op: Box<FusedOp>, rows: usize, least_vertices: usize, size: [usize; 2] },
+    Sum(Drawn),
+    /// Vertices `[views, 3, V]`, a table and targets `[1 or views, height, width]` to losses `[views]`.
+    Loss(Drawn),
     /// Vertices, attributes, tables, a background and maybe a texture to an image in colours.
     Blend(Box<Blend>),
     /// An op that needs no renderer.
     Elementary(ElementaryOp),
     /// Sums to coverage of the same shape, under any T-conorm.
     AnyCoverage(Taped),
+}
+
+#[derive(Clone)]
+struct Drawn {
+    op: Box<FusedOp>,
+    rows: usize,
+    least_vertices: usize,
+    size: [usize; 2],
 }
 
 #[derive(Clone)]
@@ -50,8 +60,13 @@ impl Op {
         least_vertices: usize,
         size: [usize; 2],
     ) -> Self {
-        let rows = silhouette.profile().knots();
-        Self(Arc::new(Kind::Sum { op: Box::new(silhouette.op()), rows, least_vertices, size }))
+        let (op, rows) = (Box::new(silhouette.op()), silhouette.profile().knots());
+        Self(Arc::new(Kind::Sum(Drawn { op, rows, least_vertices, size })))
+    }
+
+    /// The loss of silhouettes, whose table has so many `rows`.
+    pub(crate) fn loss(op: FusedOp, rows: usize, least_vertices: usize, size: [usize; 2]) -> Self {
+        Self(Arc::new(Kind::Loss(Drawn { op: Box::new(op), rows, least_vertices, size })))
     }
 
     /// `least` are the numbers of vertices and of entries that faces ask for.
@@ -87,7 +102,7 @@ impl Op {
     pub(crate) fn keeping(&self) -> Self {
         let mut kind = Kind::clone(&self.0);
         match &mut kind {
-            Kind::Sum { op, .. } => **op = op.keeping(),
+            Kind::Sum(of) | Kind::Loss(of) => *of.op = of.op.keeping(),
             Kind::Blend(blend) => blend.op = blend.op.keeping(),
             _ => {}
         }
@@ -177,10 +192,11 @@ fn misfit(dims: &[Vec<usize>]) -> String {
 impl Kind {
     fn inputs(&self) -> usize {
         match self {
-            Self::Sum { .. }
+            Self::Sum(_)
             | Self::Elementary(
                 ElementaryOp::Perspective | ElementaryOp::SquaredError | ElementaryOp::Iou,
             ) => 2,
+            Self::Loss(_) => 3,
             Self::Blend(blend) => 4 + usize::from(blend.texture.is_some()),
             _ => 1,
         }
@@ -189,11 +205,14 @@ impl Kind {
     /// The shape of the value, if the inputs fit.
     fn shape(&self, dims: &[Vec<usize>]) -> Option<Vec<usize>> {
         Some(match (self, dims) {
-            (Self::Sum { rows, least_vertices, size, .. }, [vertices, table]) => {
-                let &[views, 3, count] = &vertices[..] else { return None };
-                let tables = table == &[*rows, 4] || table == &[views, *rows, 4];
-                (views > 0 && count >= *least_vertices && tables)
-                    .then(|| vec![views, size[0], size[1]])?
+            (Self::Sum(of), [vertices, table]) => {
+                let views = of.views(vertices, table)?;
+                vec![views, of.size[0], of.size[1]]
+            }
+            (Self::Loss(of), [vertices, table, target]) => {
+                let views = of.views(vertices, table)?;
+                let fits = [1, views].iter().any(|held| target == &[*held, of.size[0], of.size[1]]);
+                fits.then(|| vec![views])?
             }
             (Self::Blend(blend), [vertices, attributes, tables, background, texture @ ..]) => {
                 let (&[views, 3, _], &[behind]) = (&vertices[..], &background[..]) else {
@@ -251,11 +270,20 @@ impl Kind {
 
     fn run<F: Float>(&self, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData {
         match self {
-            Self::Sum { op, .. } => F::run_pass(op, pass, slices, dims),
+            Self::Sum(of) | Self::Loss(of) => F::run_pass(&of.op, pass, slices, dims),
             Self::Blend(blend) => F::run_pass(&blend.op, pass, slices, dims),
             Self::Elementary(op) => F::run_pass(&FusedOp::Elementary(*op), pass, slices, dims),
             Self::AnyCoverage(of) => taped(of, pass, slices),
         }
+    }
+}
+
+impl Drawn {
+    /// The number of views, if vertices and a table fit.
+    fn views(&self, vertices: &[usize], table: &[usize]) -> Option<usize> {
+        let &[views, 3, count] = vertices else { return None };
+        let tables = table == [self.rows, 4] || table == [views, self.rows, 4];
+        (views > 0 && count >= self.least_vertices && tables).then_some(views)
     }
 }
 

@@ -33,19 +33,20 @@ pub(crate) struct Found<F> {
 }
 
 /// An op of which one input, at `place`, is a table of φ: as a function that has φ there.
-struct Tabled<'a, F> {
-    op: Op,
+pub(crate) struct Tabled<'a, F> {
+    pub(crate) op: Op,
     place: usize,
     drawing: &'a Drawing,
     table: Vec<F>,
 }
 
 impl<'a, F: Float> Tabled<'a, F> {
-    fn new(op: Op, place: usize, drawing: &'a Drawing) -> Self {
+    pub(crate) fn new(op: Op, place: usize, drawing: &'a Drawing) -> Self {
         Self { op, place, drawing, table: drawing.table() }
     }
 
-    fn scene<'b>(&'b self, views: &[View<'b, F>]) -> Vec<View<'b, F>> {
+    /// The inputs with the table in its place.
+    pub(crate) fn scene<'b>(&'b self, views: &[View<'b, F>]) -> Vec<View<'b, F>> {
         let mut views = views.to_vec();
         views[self.place] = View { dims: vec![self.drawing.knots.rows, 4], values: &self.table };
         views
@@ -97,7 +98,7 @@ impl<'a, F: Float> Tabled<'a, F> {
     }
 }
 
-fn sum<F: Float>(a: Vec<F>, b: &[F]) -> Vec<F> {
+pub(crate) fn sum<F: Float>(a: Vec<F>, b: &[F]) -> Vec<F> {
     a.into_iter().zip(b).map(|(a, b)| a + *b).collect()
 }
 

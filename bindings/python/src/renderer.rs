@@ -4,13 +4,17 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use softrast_raster::{HostBackend, Projected, TConorm, low_level::Rasterizer};
+use softrast_raster::{
+    HostBackend, Projected, TConorm,
+    low_level::{PixelLoss, Rasterizer},
+};
 use softrast_tensor::{DType, Tensor, TensorData};
 
 use crate::{
     checks::{check_progress, check_size, check_tolerance, corners, least},
     function::Function,
     guard::{guarded, refused},
+    losses::Losses,
     passes::Silhouettes,
     softness::Softness,
 };
@@ -96,6 +100,16 @@ impl Renderer {
     /// The function from vertices `[views, 3, V]` and, unless it is the renderer's own, φ `[P]` to coverage `[views, height, width]`.
     fn silhouette(&self, own: bool) -> Function {
         Function::silhouette(self.scene.clone(), own)
+    }
+
+    /// The function from vertices `[views, 3, V]` and targets `[1 or views, height, width]` to the loss "mse" or "iou" of each view, if it has one.
+    fn loss(&self, name: &str) -> PyResult<Option<Function>> {
+        let loss = match name {
+            "mse" => PixelLoss::SquaredError,
+            "iou" => PixelLoss::Iou,
+            _ => return Err(refused(format!("there is no loss {name}"))),
+        };
+        Ok(Losses::new(&self.scene, loss).map(Function::loss))
     }
 
     /// The surrogate, if the softness has one: its silhouettes `[views, height, width]` under its own φ.

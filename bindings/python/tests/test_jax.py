@@ -76,6 +76,21 @@ def test_losses_are_their_formulas_with_gradients_of_both():
         check_grads(loss, (a, b), order=1, modes=["fwd"], eps=1e-5)
 
 
+@pytest.mark.parametrize("loss", ["mse", "iou"])
+def test_a_loss_in_one_op_is_that_of_two_with_derivatives_of_both_orders(loss):
+    draw, target = renderer(), jnp.asarray(np.random.default_rng(0).random((1, 6, 5)))
+    seen, two = sj.project(CORNERS, CAMERAS), {"mse": sj.mse_loss, "iou": sj.iou_loss}[loss]
+    of = lambda seen, target: (sj.silhouette_loss(draw, seen, target, loss) ** 2).sum()
+    other = lambda seen, target: (two(sj.silhouette(draw, seen), target) ** 2).sum()
+    for derivative in (lambda f: f, lambda f: jax.grad(f, (0, 1)), lambda f: jax.hessian(f, (0, 1)), lambda f: jax.jit(jax.grad(f))):
+        found, expected = (jax.tree.leaves(derivative(f)(seen, target)) for f in (of, other))
+        assert all(np.allclose(a, b, rtol=1e-9, atol=1e-12) for a, b in zip(found, expected))
+    phi = jnp.asarray(draw.phi)
+    assert np.allclose(sj.silhouette_loss(draw, seen, target, loss, phi), two(sj.silhouette(draw, seen), target))
+    with pytest.raises(ValueError, match="loss must be one of mse, iou"):
+        sj.silhouette_loss(draw, seen, target, "l1")
+
+
 def test_colours_are_those_of_numpy_with_derivatives_of_both_orders():
     draw = softrast.ColourRenderer(FACES, (4, 3), softrast.Softness("logistic", 0.2), [1.5, 3.5], depth_scale=0.3, tolerance=1e-9)
     seen = softrast.project(CORNERS, CAMERAS)

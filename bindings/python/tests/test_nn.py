@@ -224,6 +224,8 @@ def test_one_target_is_compared_with_all_views():
     (lambda: st.silhouette(silhouettes().renderer, st.project(CORNERS, CAMERAS), torch.zeros(2)), r"phi must be \[1\], found \[2\]"),
     (lambda: st.mse_loss(torch.zeros(2, 3, 4), torch.zeros(2, 4, 3)), r"target \[1 or views, height, width\], found \[2, 3, 4\] and \[2, 4, 3\]"),
     (lambda: st.value_and_grad(silhouettes().renderer, st.project(CORNERS, CAMERAS), torch.zeros(1, 6, 5), "l1"), "loss must be one of mse, iou"),
+    (lambda: st.silhouette_loss(silhouettes().renderer, st.project(CORNERS, CAMERAS), torch.zeros(1, 6, 5), "l1"), "loss must be one of mse, iou"),
+    (lambda: st.silhouette_loss(silhouettes().renderer, st.project(CORNERS, CAMERAS), torch.zeros(1, 5, 6)), r"found \[2, 6, 5\] and \[1, 5, 6\]"),
     (lambda: st.jvp(silhouettes().renderer, st.project(CORNERS, CAMERAS), CORNERS), r"direction must be \[2, 4, 3\] as the vertices are, found \[4, 3\]"),
     (lambda: st.silhouette(silhouettes().renderer, CORNERS[None].to("meta")), "vertices must lie on the CPU, found meta"),
 ])

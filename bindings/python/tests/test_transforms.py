@@ -46,6 +46,7 @@ def tensors(draw=None):
         "orbit_matrix": (st._ORBIT_MATRIX, [cameras]),
         "project": (st._PERSPECTIVE, [corners[None], torch.rand(2, 3, 4, **F64) + 1.0]),
         "silhouette": (draw._by_phi_name, [seen, torch.from_numpy(draw.phi)]),
+        "silhouette_loss": (draw._loss_names["iou"], [seen, pixels[:1]]),
         "blend": (paint._plain_name, [seen, values, both, torch.tensor([0.2, 0.8, -4.0], **F64)]),
         "mse_loss": (st._LOSSES["mse"][1], [pixels, 1.0 - pixels[:1]]),
         "iou_loss": (st._LOSSES["iou"][1], [pixels, 1.0 - pixels[:1]]),
@@ -214,6 +215,54 @@ def test_losses_gradients_and_hessian_products_are_those_of_autograd(loss):
     value, change = st.jvp(draw, seen, direction)
     (along,) = torch.autograd.grad((st.silhouette(draw, seen) * value.detach()).sum(), seen)
     torch.testing.assert_close((change * value).sum(), (along * direction).sum(), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("loss", ["mse", "iou"])
+@pytest.mark.parametrize("settings", [
+    {}, {"cull_back_faces": True}, {"t_conorm": "einstein"}, {"softness": softrast.Softness.learned("shape3d-surrogate")},
+], ids=["own", "front", "t_conorm", "surrogate"])
+def test_a_loss_in_one_op_is_that_of_two_with_derivatives_of_both_orders_and_modes(loss, settings):
+    draw = renderer(**settings)
+    seen = st.project(*scene()).detach().contiguous()
+    target = torch.rand(1, 4, 5, generator=torch.Generator().manual_seed(0), **F64)
+    two = {"mse": st.mse_loss, "iou": st.iou_loss}[loss]
+    weights = torch.tensor([0.3, 0.9], **F64)
+    # Nonlinear in the losses, so that the upstream has a derivative too.
+    of = lambda seen, target: (weights * st.silhouette_loss(draw, seen, target, loss).pow(2)).sum()
+    other = lambda seen, target: (weights * two(st.silhouette(draw, seen), target).pow(2)).sum()
+    found, expected = ([], [])
+    for results, function in ((found, of), (expected, other)):
+        for view in (seen, seen.float()):
+            results.append(function(view, target).double())
+        if settings.keys() & {"softness"}:
+            # The gradient of a surrogate is not that of the image: no second derivatives.
+            results.append(torch.func.grad(function)(seen, target))
+            continue
+        results.extend(torch.func.grad(function, (0, 1))(seen, target))
+        results.extend(part for row in torch.func.hessian(function, (0, 1))(seen, target) for part in row)
+        results.append(torch.func.vmap(torch.func.grad(function), (None, 0))(seen, torch.stack([target, 1.0 - target])))
+    for a, b in zip(found, expected, strict=True):
+        torch.testing.assert_close(a, b, rtol=1e-6 if a.dim() == 0 else 1e-9, atol=1e-12)
+    with torch.no_grad():
+        torch.testing.assert_close(of(seen, target), other(seen, target), rtol=1e-9, atol=1e-12)
+    target = target.expand(2, 4, 5)
+    torch.testing.assert_close(of(seen, target), other(seen, target), rtol=1e-9, atol=1e-12)
+
+
+def test_a_compiled_step_with_a_loss_in_one_op_has_the_results_of_eager_mode():
+    draw = renderer()
+    corners, cameras = scene()
+    target = torch.full((1, 4, 5), 0.3, **F64)
+    loss = lambda corners: st.silhouette_loss(draw, st.project(corners, cameras), target, "iou").sum()
+    torch.compiler.reset()
+    found = []
+    for of in (torch.compile(loss, fullgraph=True), loss):
+        leaf = corners.clone().requires_grad_()
+        value = of(leaf)
+        value.backward()
+        found.append((value.detach(), leaf.grad))
+    for a, b in zip(*found):
+        torch.testing.assert_close(a, b, rtol=1e-12, atol=1e-14)
 
 
 def test_a_compiled_step_is_one_graph_with_the_results_of_eager_mode():

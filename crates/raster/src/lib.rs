@@ -143,6 +143,7 @@ pub mod low_level {
         silhouette::{Rasterizer, Silhouette},
         small_product::small_product,
     };
+    pub use softrast_kernel::PixelLoss;
 }
 pub(crate) use low_level::*;
 

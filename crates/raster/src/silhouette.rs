@@ -5,7 +5,7 @@ use softrast_softness::Softness;
 use softrast_tensor::{Backend, Tensor, TensorData};
 
 use crate::{
-    HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
+    HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, SilhouetteLoss, TConorm,
     backend::{elementary, pairs, primitive, silhouette_loss, straight_through_sum},
     curve::precise,
     loss::loss_of_images,
@@ -209,6 +209,14 @@ impl<S: Softness> Silhouette<S> {
     /// The op of the sums that coverage is computed from, for callers that run it on slices.
     pub fn op(&self) -> FusedOp {
         FusedOp::ProfileSum(self.op.clone())
+    }
+
+    /// The op of the losses of vertices, a table and a target, for callers that run it on slices. Only the probabilistic sum has one.
+    pub fn loss_op(&self, loss: PixelLoss) -> Option<FusedOp> {
+        (self.profile.t_conorm() == TConorm::Probabilistic).then(|| {
+            let sum = self.op.clone();
+            FusedOp::SilhouetteLoss(SilhouetteLoss { sum, loss, weighted: false, kept: None })
+        })
     }
 
     /// The silhouette with the softness stretched by `factor` along the distance, if it can be derived from this one.

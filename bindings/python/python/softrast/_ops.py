@@ -15,7 +15,7 @@ import torch
 from . import _passes
 
 # The names of the functions.
-_NAMES = ("orbit_matrix", "project", "silhouette", "blend", "mse_loss", "iou_loss")
+_NAMES = ("orbit_matrix", "project", "silhouette", "silhouette_loss", "blend", "mse_loss", "iou_loss")
 # Tensors and the name of a function; which inputs have a direction, and which gradients are wanted, "1" or "0" for each in the order of the
 # tensors. Lists of flags would not do: torch takes an empty one for a list of tensors.
 _SCHEMA = "(Tensor[] tensors, str function, str along, str wanted) -> Tensor[]"
@@ -33,6 +33,13 @@ def value(kind, name, inputs):
     if _COMPILES and torch.compiler.is_compiling():
         return getattr(torch.ops.softrast, kind)(inputs, name, "", "")
     return _eager("", name, inputs, [], [])
+
+
+def value_alone(kind, name, inputs):
+    """The value: nothing is kept where nothing is recorded."""
+    if _COMPILES and torch.compiler.is_compiling():
+        return value(kind, name, inputs)[0]
+    return _eager("_image", name, inputs, [], [])[0]
 
 
 def jvp(kind, name, inputs, kept, directions):
@@ -131,8 +138,8 @@ def _eager(order, name, tensors, along, wanted):
     recorded = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in tensors)
     if not (transformed or recorded or torch.autograd.forward_ad._current_level >= 0 or torch.jit.is_tracing()):
         return _computed(order, name, tensors, along, wanted)
-    kind = {"": _Value, "_vjp": _Vjp, "_jvp": _Jvp, "_vjp_of_vjp": _VjpOfVjp}[order]
-    flags = {"": (), "_vjp": (wanted,), "_jvp": (along,), "_vjp_of_vjp": (along, wanted)}[order]
+    kind = {"": _Value, "_image": _Value, "_vjp": _Vjp, "_jvp": _Jvp, "_vjp_of_vjp": _VjpOfVjp}[order]
+    flags = {"": (), "_image": (), "_vjp": (wanted,), "_jvp": (along,), "_vjp_of_vjp": (along, wanted)}[order]
     # Beside what is done above `Function.apply` binds default values, by a signature that it makes anew at every call.
     apply = kind.apply if transformed else super(torch.autograd.Function, kind).apply
     return apply(name, *flags, *tensors)

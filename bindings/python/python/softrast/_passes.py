@@ -47,6 +47,15 @@ def silhouette(native, own):
     return Function("silhouette", native.silhouette(own), lambda vertices, *phi: [[vertices[0], *size]] * 2)
 
 
+def silhouette_losses(native):
+    """By their names the losses `[views]` of vertices `[views, 3, V]` against targets `[1 or views, height, width]`, as far as the renderer has
+    them; kept are the gradients to the vertices.
+    """
+    shapes = lambda vertices, target: [[vertices[0]], [*vertices]]
+    found = {name: native.loss(name) for name in ("mse", "iou")}
+    return {name: Function("silhouette_loss", of, shapes) for name, of in found.items() if of is not None}
+
+
 def blend(native, corners, texture):
     """Vertices `[views, 3, V]`, attributes `[1 or views, entries, numbers]`, both φ in a row `[P + Q]`, a background with the logarithm of its
     weight `[channels + 1]` and, if there is one, a texture `[texels, 4]` to an image `[views, channels + 1, height, width]`.

@@ -39,11 +39,13 @@ class Renderer:
         self._draw_by(_native.Renderer(*self._settings.values()))
 
     def _draw_by(self, native: _native.Renderer) -> None:
-        self._native = native
+        self._native, self._size = native, self._settings["size"]
         # Plain attributes: torch.compile reads no others.
         self._least, self._parameters = self._native.least_vertices, len(self._native.phi)
         self._by_own, self._by_phi = (_passes.silhouette(self._native, own) for own in (True, False))
         self._by_own_name, self._by_phi_name = self._by_own.handle, self._by_phi.handle
+        self._losses = _passes.silhouette_losses(self._native)
+        self._loss_names = {name: of.handle for name, of in self._losses.items()}
 
     def with_faces(self, faces: ArrayLike) -> Renderer:
         """This renderer for other `faces` `[F, 3]`. It keeps its knots unless there are more faces than they were chosen for."""

@@ -17,8 +17,9 @@ import softrast as _softrast
 
 from . import _cameras, _passes, _primitives, _shapes
 
-__all__ = ["blend", "iou_loss", "mse_loss", "orbit", "pinhole", "project", "silhouette"]
+__all__ = ["blend", "iou_loss", "mse_loss", "orbit", "pinhole", "project", "silhouette", "silhouette_loss"]
 
+_LOSSES = {"mse": _passes.MSE_LOSS, "iou": _passes.IOU_LOSS}
 _HALVES = (_jnp.float16, _jnp.bfloat16)
 
 
@@ -94,6 +95,23 @@ def _loss(function, image, target):
     image, target = _floats(image, "image"), _floats(target, "target")
     _shapes.images(image.shape, target.shape)
     return _primitives.value(function, [image, target.astype(image.dtype)])
+
+
+def silhouette_loss(
+    renderer: _softrast.Renderer, vertices: _ArrayLike, target: _ArrayLike, loss: str = "mse", phi: _Optional[_ArrayLike] = None,
+) -> _jax.Array:
+    """Losses `[views]` of the `silhouette` against a `target` `[1 or views, height, width]`; `loss` is "mse" or "iou".
+
+    See `softrast.torch.silhouette_loss`: under the renderer's own φ it is one op, with the gradient to the vertices, as a rule.
+    """
+    if loss not in _LOSSES:
+        raise ValueError(f"loss must be one of {', '.join(_LOSSES)}, found {loss!r}")
+    if phi is not None or loss not in renderer._losses:
+        return _loss(_LOSSES[loss], silhouette(renderer, vertices, phi), target)
+    vertices, target = _floats(vertices, "vertices"), _floats(target, "target")
+    _shapes.vertices(vertices.shape, renderer._least)
+    _shapes.images((vertices.shape[0], *renderer._size), target.shape)
+    return _primitives.value(renderer._losses[loss], [_jnp.swapaxes(vertices, 1, 2), target.astype(vertices.dtype)])
 
 
 def blend(

@@ -17,8 +17,8 @@ import softrast as _softrast
 from . import _cameras, _ops, _passes, _shapes
 
 __all__ = [
-    "blend", "blends", "from_clip", "hard_silhouette", "hvp", "iou_loss", "jvp", "mse_loss", "orbit", "pinhole", "project", "silhouette", "silhouettes",
-    "value_and_grad",
+    "blend", "blends", "from_clip", "hard_silhouette", "hvp", "iou_loss", "jvp", "mse_loss", "orbit", "pinhole", "project", "silhouette",
+    "silhouette_loss", "silhouettes", "value_and_grad",
 ]
 
 _Number = _Union[float, _torch.Tensor]
@@ -119,7 +119,7 @@ def silhouette(renderer: _softrast.Renderer, vertices: _torch.Tensor, phi: _Opti
     has a surrogate, the gradient to the vertices is that of the surrogate, and the gradient to φ is 0.
     """
     name, inputs = _scene(renderer, vertices, phi)
-    return _ops.value("silhouette", name, inputs)[0]
+    return _ops.value_alone("silhouette", name, inputs)
 
 
 def silhouettes(
@@ -182,11 +182,40 @@ def iou_loss(image: _torch.Tensor, target: _torch.Tensor) -> _torch.Tensor:
     return _loss("iou", image, target)
 
 
+def _known(loss: str) -> None:
+    if loss not in _LOSSES:
+        raise ValueError(f"loss must be one of {', '.join(_LOSSES)}, found {loss!r}")
+
+
 def _loss(name: str, image: _torch.Tensor, target: _torch.Tensor) -> _torch.Tensor:
     image, target = _floats(image, "image"), _floats(target, "target")
     _shapes.images(image.shape, target.shape)
     kind, handle = _LOSSES[name]
     return _ops.value(kind, handle, [image, target.to(image.dtype)])[0]
+
+
+def silhouette_loss(
+    renderer: _softrast.Renderer, vertices: _torch.Tensor, target: _torch.Tensor, loss: str = "mse", phi: _Optional[_torch.Tensor] = None,
+) -> _torch.Tensor:
+    """Losses `[views]` of the `silhouette` against a `target` `[1 or views, height, width]`; `loss` is "mse" or "iou".
+
+    They are those of `mse_loss` and `iou_loss` of the image, up to rounding. Under the renderer's own φ, with the probabilistic sum and without a
+    surrogate, one op computes image, loss and gradient to the vertices: a step takes 0.7 to 0.85 of its time with two ops.
+    """
+    _known(loss)
+    name, inputs = _scene(renderer, vertices, phi)
+    if phi is not None or loss not in renderer._loss_names:
+        return _loss(loss, _ops.value_alone("silhouette", name, inputs), target)
+    return _ops.value_alone("silhouette_loss", *_loss_scene(renderer, inputs[0], target, loss))
+
+
+def _loss_scene(
+    renderer: _softrast.Renderer, vertices: _torch.Tensor, target: _torch.Tensor, loss: str,
+) -> _Tuple[str, _List[_torch.Tensor]]:
+    """The name of a renderer's loss and its inputs: vertices `[views, 3, V]` and the target."""
+    target = _floats(target, "target")
+    _shapes.images((vertices.shape[0], *renderer._size), target.shape)
+    return renderer._loss_names[loss], [vertices, target.to(vertices.dtype)]
 
 
 def jvp(
@@ -237,10 +266,14 @@ def _along(direction: _torch.Tensor, vertices: _torch.Tensor) -> _torch.Tensor:
 
 def _judged(renderer, vertices, target, loss, phi, direction):
     """Losses, their gradient and, along a direction, its change."""
-    if loss not in _LOSSES:
-        raise ValueError(f"loss must be one of {', '.join(_LOSSES)}, found {loss!r}")
+    _known(loss)
     kind, handle = _LOSSES[loss]
     name, inputs = _scene(renderer, vertices, phi)
+    if direction is None and phi is None and loss in renderer._loss_names:
+        name, inputs = _loss_scene(renderer, inputs[0], target, loss)
+        losses, *kept = _ops.value("silhouette_loss", name, inputs)
+        (gradient,) = _ops.vjp("silhouette_loss", name, inputs, kept, _torch.ones_like(losses), [True, False])
+        return losses, gradient.transpose(1, 2), None
     wanted = [True, *[False] * (len(inputs) - 1)]
     image, *kept = _ops.value("silhouette", name, inputs)
     target = _floats(target, "target").to(image.dtype)

@@ -22,6 +22,16 @@ pub struct SilhouetteLoss {
     pub(crate) kept: Option<Arc<OnceLock<TensorData>>>,
 }
 
+impl From<PixelLoss> for ElementaryOp {
+    /// The loss as an op of an image and a target.
+    fn from(loss: PixelLoss) -> Self {
+        match loss {
+            PixelLoss::SquaredError => Self::SquaredError,
+            PixelLoss::Iou => Self::Iou,
+        }
+    }
+}
+
 impl SilhouetteLoss {
     /// The op of a call whose passes share a cache.
     pub(crate) fn keeping(&self) -> Self {
@@ -108,10 +118,7 @@ impl SilhouetteLoss {
         let sums = F::sums(inputs, bands);
         let image = vec![dims[0][0], self.sum.size.height, self.sum.size.width];
         let shapes = [image, dims[2].clone()];
-        let loss = match self.loss {
-            PixelLoss::SquaredError => ElementaryOp::SquaredError,
-            PixelLoss::Iou => ElementaryOp::Iou,
-        };
+        let loss = self.loss.into();
         // `by_sums` does not depend on the motion of the sums; its change along the direction does.
         let still = vec![F::ZERO; sums.len()];
         let [by_sums, _] = dual_upstream(loss, [&sums, &still], judged, upstream, &shapes);
