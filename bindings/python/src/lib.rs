@@ -9,6 +9,7 @@ mod checks;
 mod colour;
 mod function;
 mod guard;
+mod kind;
 mod knots;
 mod learn;
 mod losses;

@@ -16,8 +16,9 @@ use pyo3::{prelude::*, types::PyCapsule};
 
 use crate::{
     arrays::{Array, Float, Floats},
-    function::{Call, Known, Order},
+    function::Known,
     guard::message,
+    kind::{Call, Order},
 };
 
 /// The versions that this was written for.
