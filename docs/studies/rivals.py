@@ -69,7 +69,8 @@ def squared_error(image, target):
     return (image - target).square().mean()
 
 
-# A function for each code: from a scene to the loss of an image and to variants by name, each a function from vertices [V, 3] to the image [views, size, size].
+# A function for each code: from a scene to variants by name, each a function from vertices [V, 3] to the image [views, size, size], and one from
+# image and target to the loss.
 
 
 def softrast(scene):
@@ -78,7 +79,11 @@ def softrast(scene):
 
     renderer = softrast.Renderer(scene.faces.numpy(), scene.size, softrast.Softness("logistic", SIGMA, squared=True))
     cameras = torch.from_numpy(softrast.orbit(DISTANCE, 0.0, scene.azimuths.numpy(), FOV)).float()
-    return lambda image, target: st.mse_loss(image, target).mean(), {"": lambda vertices: st.silhouette(renderer, st.project(vertices, cameras))}
+    seen = lambda vertices: st.project(vertices, cameras)
+    return {
+        "one op": (seen, lambda corners, target: st.silhouette_loss(renderer, corners, target).mean()),
+        "two ops": (lambda vertices: st.silhouette(renderer, seen(vertices)), lambda image, target: st.mse_loss(image, target).mean()),
+    }
 
 
 def pytorch3d(scene):
@@ -91,7 +96,7 @@ def pytorch3d(scene):
     cameras = pr.FoVPerspectiveCameras(R=rotations, T=translations, fov=FOV, device=device)
     renderer = pr.MeshRenderer(pr.MeshRasterizer(cameras, settings), pr.SoftSilhouetteShader(pr.BlendParams(sigma=SIGMA)))
     meshes = Meshes([scene.positions], [scene.faces]).extend(scene.views)
-    return squared_error, {"": lambda vertices: renderer(meshes.update_padded(vertices.expand(scene.views, -1, -1)))[..., 3]}
+    return {"": (lambda vertices: renderer(meshes.update_padded(vertices.expand(scene.views, -1, -1)))[..., 3], squared_error)}
 
 
 def drtk(scene):
@@ -105,7 +110,7 @@ def drtk(scene):
         _, barycentric = drtk.render(corners, faces, index)
         return drtk.edge_grad_estimator(corners, faces, barycentric, (index != -1).float()[:, None], index)[:, 0]
 
-    return squared_error, {"": image}
+    return {"": (image, squared_error)}
 
 
 def deodr(scene):
@@ -138,7 +143,7 @@ def deodr(scene):
             by_places = torch.from_numpy(np.stack([each.ij_b for each in ctx.planes])).float()
             return torch.nn.functional.pad(by_places, (0, 1))
 
-    return squared_error, {"": lambda vertices: Render.apply(in_pixels(vertices, scene))}
+    return {"": (lambda vertices: Render.apply(in_pixels(vertices, scene)), squared_error)}
 
 
 def mirrored(image, target):
@@ -160,7 +165,7 @@ def generalized(library, scene, variants):
     def drawing(renderer):
         return lambda vertices: renderer(camera(library.Mesh(vertices.repeat(scene.views, 1, 1), faces)))[:, 3]
 
-    return mirrored, {name: drawing(renderer) for name, renderer in variants.items()}
+    return {name: (drawing(renderer), mirrored) for name, renderer in variants.items()}
 
 
 GENERALIZED = {"dist_shape": 0.0, "dist_shift": 0.0, "dist_eps": 100, "aggr_alpha_func": "probabilistic", "aggr_alpha_t_conorm_p": 0.0, "aggr_rgb_func": "hard"}
@@ -190,7 +195,7 @@ def softras(scene):
     renderer = sr.SoftRenderer(scene.size, camera_mode="look_at", viewing_angle=FOV / 2, sigma_val=SIGMA, aggr_func_rgb="hard")
     eyes(scene, renderer.transform)
     faces = scene.faces.int().expand(scene.views, -1, -1).contiguous()
-    return mirrored, {"": lambda vertices: renderer(vertices.repeat(scene.views, 1, 1), faces)[:, 3]}
+    return {"": (lambda vertices: renderer(vertices.repeat(scene.views, 1, 1), faces)[:, 3], mirrored)}
 
 
 def nvdiffrast(scene):
@@ -208,7 +213,7 @@ def nvdiffrast(scene):
         found = dr.rasterize(context, clip, faces, size)[0].detach()
         return dr.antialias((found[..., 3:] > 0).float(), found, clip, faces, topology_hash=topology)[..., 0]
 
-    return squared_error, {"": image}
+    return {"": (image, squared_error)}
 
 
 # The function, the name of the distribution, the devices, and how to install the code.
@@ -225,7 +230,7 @@ CODES = {
 
 
 def measure(draw, loss, scene, steps, warm_up=3):
-    """Median ms of a step, and the mean of the image."""
+    """Median ms of a step, and the mean of the image; not a number where the image stays inside an op."""
     vertices = scene.positions.clone().requires_grad_()
     target = disk(scene.size).to(vertices.device).repeat(scene.views, 1, 1)
     times = []
@@ -239,7 +244,7 @@ def measure(draw, loss, scene, steps, warm_up=3):
         times.append(1e3 * (time.perf_counter() - start))
     if not (vertices.grad.isfinite().all() and vertices.grad.abs().sum() > 0):
         sys.exit("the gradient is not finite or is zero")
-    return statistics.median(times[-steps:]), image.mean().item()
+    return statistics.median(times[-steps:]), image.mean().item() if image.shape[-1] == scene.size else math.nan
 
 
 def machine(device, threads):
@@ -280,10 +285,10 @@ def main():
     for (positions, faces, _), azimuths, size in meshes:
         scene = Scene(torch.from_numpy(positions).float().to(device), torch.from_numpy(faces).long().to(device), azimuths.to(device), size)
         try:
-            loss, variants = build(scene)
+            variants = build(scene)
         except ImportError as error:
             sys.exit(f"{error}; install {given.code}: {install}")
-        for name, draw in variants.items():
+        for name, (draw, loss) in variants.items():
             results.setdefault(name, []).append(measure(draw, loss, scene, given.steps, given.warm_up))
     try:
         version = importlib.metadata.version(distribution)
