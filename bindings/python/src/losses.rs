@@ -33,8 +33,8 @@ impl Losses {
         whole.then(|| Self { scene: scene.clone(), loss, of_images, drawing: OnceLock::new() })
     }
 
-    /// The op of the loss, with a table of the renderer's φ.
-    fn tabled<F: Float>(&self) -> Result<Tabled<'_, F>, String> {
+    /// The op of the loss, with a table of the renderer's φ; if it `keeps`, it computes the gradient too.
+    fn tabled<F: Float>(&self, keeps: bool) -> Result<Tabled<'_, F>, String> {
         let drawing = match self.drawing.get() {
             Some(drawing) => drawing,
             None => {
@@ -48,7 +48,8 @@ impl Losses {
                 self.drawing.get_or_init(|| drawing)
             }
         };
-        Ok(Tabled::new(drawing.knots.op.keeping(), 1, drawing))
+        let op = &drawing.knots.op;
+        Ok(Tabled::new(if keeps { op.keeping() } else { op.clone() }, 1, drawing))
     }
 
     /// The losses and, if it `keeps`, their gradients.
@@ -57,7 +58,7 @@ impl Losses {
         views: &[View<'_, F>],
         keeps: bool,
     ) -> Result<Vec<Vec<F>>, String> {
-        let of = self.tabled()?;
+        let of = self.tabled(keeps)?;
         let scene = of.scene(&[views[0].clone(), views[0].clone(), views[1].clone()]);
         if !keeps {
             return Ok(vec![of.op.forward(&scene)?]);
@@ -82,6 +83,9 @@ impl Losses {
         upstream: &View<'_, F>,
         wanted: &[bool],
     ) -> Result<Gradients<F>, String> {
+        if upstream.dims != self.dims(views)? || kept.dims != views[0].dims {
+            return Err("a loss and its gradients are of other views".to_owned());
+        }
         let of_view = kept.values.len() / upstream.values.len().max(1);
         let to_vertices = wanted[0].then(|| {
             let mut all = kept.values.to_vec();

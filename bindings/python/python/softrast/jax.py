@@ -102,7 +102,7 @@ def silhouette_loss(
 ) -> _jax.Array:
     """Losses `[views]` of the `silhouette` against a `target` `[1 or views, height, width]`; `loss` is "mse" or "iou".
 
-    See `softrast.torch.silhouette_loss`: under the renderer's own φ it is one op, with the gradient to the vertices, as a rule.
+    See `softrast.torch.silhouette_loss`: it is one op under the same conditions.
     """
     if loss not in _LOSSES:
         raise ValueError(f"loss must be one of {', '.join(_LOSSES)}, found {loss!r}")

@@ -199,7 +199,7 @@ def silhouette_loss(
 ) -> _torch.Tensor:
     """Losses `[views]` of the `silhouette` against a `target` `[1 or views, height, width]`; `loss` is "mse" or "iou".
 
-    They are those of `mse_loss` and `iou_loss` of the image, up to rounding. Under the renderer's own φ, with the probabilistic sum and without a
+    They are those of `mse_loss` and `iou_loss` of the image, to the renderer's tolerance. Under the renderer's own φ, with the probabilistic sum and without a
     surrogate, one op computes image, loss and gradient to the vertices: a step takes 0.7 to 0.85 of its time with two ops.
     """
     _known(loss)

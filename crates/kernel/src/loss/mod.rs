@@ -268,9 +268,17 @@ impl<L: Lanes> Band<'_, '_, L> {
         if self.whole {
             let (_, [by_first, by_second]) = self.loss.of_sums(sums, self.judged.target.len());
             let [by_first, by_second] = [L::splat(by_first), L::splat(by_second)];
-            let pairs = first.as_chunks_mut().0.iter_mut().zip(second.as_chunks().0);
-            for (first, second) in pairs {
-                *first = (L::of(first) * by_first + L::of(second) * by_second).array();
+            let of_first = first.as_chunks_mut().0.iter_mut();
+            match self.loss {
+                // The second part holds numbers of an earlier band, maybe not finite.
+                PixelLoss::SquaredError => {
+                    of_first.for_each(|first| *first = (L::of(first) * by_first).array());
+                }
+                PixelLoss::Iou => {
+                    for (first, second) in of_first.zip(second.as_chunks().0) {
+                        *first = (L::of(first) * by_first + L::of(second) * by_second).array();
+                    }
+                }
             }
         }
         beside(first);

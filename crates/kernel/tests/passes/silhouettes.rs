@@ -60,6 +60,37 @@ fn passes<F: Kernels>(size: [usize; 2], views: usize, far: u32) -> Vec<F> {
     all
 }
 
+#[test]
+fn a_target_that_is_not_finite_leaves_no_trace_in_later_losses() {
+    let grid = Grid { outer: 0.3, inner: 0.2, from: [0.0; 2], octaves: 12, far: 0, bits: 2 };
+    let table: Vec<_> = (0..4 * grid.rows()).map(|k| 0.01 * (0.7 * k as f64).sin()).collect();
+    let inputs = Inputs {
+        vertices: &[-0.5, 0.5, 0.0, -0.5, -0.5, 0.5, 2.0, 2.0, 2.0],
+        table: &table,
+        faces: &[[0, 1, 2]],
+        grid,
+        size: ImageSize::from([16, 16]),
+        near: 0.01,
+        culls: false,
+        views: 1,
+        bands: 1,
+    };
+    let losses = |target: f64, loss| {
+        let target = [target; 256];
+        let judged = Judged { target: &target, counted: None };
+        f64::losses(&inputs, &f64::bands(&inputs), judged, loss, true)
+    };
+    // One thread, so that all bands have the same room.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    pool.install(|| {
+        let expected = losses(0.5, PixelLoss::SquaredError);
+        assert!(expected.iter().flatten().all(|x| x.is_finite()));
+        assert!(expected[1].iter().any(|x| *x != 0.0));
+        assert!(losses(f64::NAN, PixelLoss::Iou)[1].iter().any(|x| x.is_nan()));
+        assert_eq!(losses(0.5, PixelLoss::SquaredError), expected);
+    });
+}
+
 fn assert_same_bits<F: Kernels>() {
     for (size, views) in [([50, 50], 1), ([33, 41], 5), ([100, 70], 3)] {
         for far in [0, 9] {
