@@ -1,4 +1,4 @@
-//! What functions compute, by kind, for one scene.
+//! Kinds of functions, and their results for one scene.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ pub(crate) struct Call<'a> {
     pub(crate) wanted: &'a [bool],
 }
 
-/// What a function computes.
+/// A kind of function.
 pub(crate) enum Kind {
     /// An op, the numbers of axes of its inputs, and whether views may be concatenated.
     Op(Op, &'static [usize], bool),

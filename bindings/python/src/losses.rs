@@ -152,12 +152,12 @@ impl Losses {
         Ok((image, sums))
     }
 
-    /// What the loss of images takes.
+    /// Inputs of the loss of images.
     fn pair<'a, F: Float>(&self, views: &[View<'a, F>], image: &'a [F]) -> [View<'a, F>; 2] {
         [View { dims: self.scene.dims(&views[0]), values: image }, views[1].clone()]
     }
 
-    /// What the scene takes.
+    /// Inputs of the scene.
     fn inputs<'a, F: Float>(&self, views: &[View<'a, F>]) -> Inputs<'a, F> {
         let none = View { dims: Vec::new(), values: &[] };
         Inputs { views: vec![views[0].clone(), none], phi: self.scene.renderer.phi().to_vec() }
