@@ -81,7 +81,7 @@ mod tests {
         };
         for (name, row) in [
             ("errors pose original", "| preset | scale 0.1 | 0.150 ("),
-            ("summary of results/cells.jsonl", "| POSE | 2 | 0.150 |  |  |"),
+            ("summary of results/cells.jsonl", "| POSE | 2 | 0.150, 0.150 |  |  |"),
             ("seconds", "| POSE | original | preset | 0.500 | 1.67 |"),
         ] {
             let new = document(&of(name)).unwrap();

@@ -14,6 +14,8 @@ const READING: &str = include_str!("text/reading.md");
 const SECONDS: &str = include_str!("text/seconds.md");
 const PAPER: &str = include_str!("text/paper.md");
 const CROSSED: &str = include_str!("text/crossed.md");
+const CHANGED: &str = "Resolution, tolerance, backend";
+const VARIATIONS: &str = include_str!("text/variations.md");
 
 /// The tables of the paper with our figures, as Markdown. The text names `command` as its origin; `pictures` is the charts' folder relative
 /// to the file, if they are to be shown.
@@ -46,6 +48,9 @@ pub(crate) fn markdown(
     }
     let _ = write!(text, "\n## Table 3 in the paper's unit\n\n{PAPER}\n{}", table("paper")?);
     let _ = write!(text, "\n## Table 5: seconds\n\n{SECONDS}\n{}", table("seconds")?);
+    if records.iter().any(|record| record.varied) {
+        let _ = write!(text, "\n## {CHANGED}\n\n{VARIATIONS}\n{}", table("variations")?);
+    }
     if records.iter().any(|record| !record.compared) {
         let crossed = table("crossed")?;
         let _ = write!(text, "\n## Table 6: cross evaluation\n\n{CROSSED}\n{crossed}");
@@ -89,6 +94,11 @@ pub(crate) fn html(
     report.heading("Seconds");
     report.paragraph(SECONDS);
     report.table(&tables::seconds(records));
+    if let Some(table) = tables::variations(records) {
+        report.heading(CHANGED);
+        report.paragraph(VARIATIONS);
+        report.table(&table);
+    }
     if let Some(table) = tables::named(records, "crossed")? {
         report.heading("Cross evaluation");
         report.paragraph(CROSSED);
@@ -108,7 +118,7 @@ mod tests {
     #[test]
     fn the_document_has_the_texts_that_another_call_would_print() {
         let document = include_str!("../../../docs/results.md");
-        for text in [HEAD, READING, PAPER, SECONDS, CROSSED] {
+        for text in [HEAD, READING, PAPER, SECONDS, VARIATIONS, CROSSED] {
             assert!(
                 document.contains(text.trim()),
                 "docs/results.md has another text than: {text}"

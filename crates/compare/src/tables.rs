@@ -26,7 +26,8 @@ pub(crate) fn tasks(records: &[Record]) -> Table {
     ]);
     for group in by_variant(records) {
         let one = group[0];
-        let [hard, parameter] = one.titles.clone();
+        let hard = one.titles[0].clone();
+        let parameter = parameter_title(one).unwrap_or_else(|| "none".to_owned());
         table.push([
             one.task().title().to_owned(),
             one.variant().to_owned(),
@@ -44,34 +45,69 @@ pub(crate) fn tasks(records: &[Record]) -> Table {
 /// Table 3: the rows of one task in one variant.
 pub(crate) fn errors(group: &[&Record]) -> Table {
     let first = group[0];
-    let [hard, parameter] = first.titles.clone();
-    let mut table = Table::new([
+    let (hard, parameter) = (first.titles[0].clone(), parameter_title(first));
+    let has_parameter = parameter.is_some();
+    let mut head = vec![
         "method".to_owned(),
         "setting".into(),
         hard,
         format!("difference to {}", first.method),
         "median".into(),
-        parameter,
-        "success".into(),
-    ]);
-    let comparisons = group.iter().filter(|one| !one.varied).count() - 1;
-    for one in group {
+    ];
+    head.extend(parameter);
+    head.push("success".into());
+    let mut table = Table::new(head);
+    let compared = group.iter().filter(|one| !one.varied);
+    let comparisons = compared.clone().count() - 1;
+    for one in compared {
         let to_first = match one.method == first.method {
             true => String::new(),
             false => difference(comparisons, &one.returned, &first.returned),
         };
         let star = if one.chosen { "" } else { " *" };
-        table.push([
+        let mut row = vec![
             one.method.clone(),
             format!("{}{star}", one.setting),
             with_interval(&one.returned),
             to_first,
             short(median(&one.returned)),
-            with_interval(&one.parameter),
-            format!("{:.0} %", 100.0 * one.success_rate()),
-        ]);
+        ];
+        row.extend(has_parameter.then(|| with_interval(&one.parameter)));
+        row.push(format!("{:.0} %", 100.0 * one.success_rate()));
+        table.push(row);
     }
     table
+}
+
+/// Methods with one property changed, next to the method as it is; none if there are no such records.
+pub(crate) fn variations(records: &[Record]) -> Option<Table> {
+    let mut table = Table::new([
+        "task",
+        "method",
+        "change",
+        "hard error",
+        "hard error, changed",
+        "s a run",
+        "s a run, changed",
+    ]);
+    let mut any = false;
+    for group in by_variant(records) {
+        for one in group.iter().filter(|one| one.varied) {
+            let of = |other: &&&Record| !other.varied && one.method.starts_with(&other.method);
+            let Some(whole) = group.iter().find(of) else { continue };
+            any = true;
+            table.push([
+                named_task(one),
+                whole.method.clone(),
+                one.method[whole.method.len()..].trim().to_owned(),
+                short(mean(&whole.returned)),
+                short(mean(&one.returned)),
+                short(whole.seconds),
+                short(one.seconds),
+            ]);
+        }
+    }
+    any.then_some(table)
 }
 
 /// Table 3 as the paper prints it, for its softnesses: ours has a fixed width, or one that narrows.
@@ -104,7 +140,7 @@ fn paper(records: &[Record]) -> Table {
 /// Table 5: cost of a run.
 pub(crate) fn seconds(records: &[Record]) -> Table {
     let mut table = Table::new(["task", "variant", "method", "seconds a run", "ms a step"]);
-    for one in by_variant(records).into_iter().flatten() {
+    for one in by_variant(records).into_iter().flatten().filter(|one| !one.varied) {
         table.push([
             one.task().title().to_owned(),
             one.variant().to_owned(),
@@ -116,8 +152,8 @@ pub(crate) fn seconds(records: &[Record]) -> Table {
     table
 }
 
-/// Summary of Table 3: the preset next to the best searched fixed width and the best searched decay, by returned hard error; in bold if the
-/// preset is significantly below both.
+/// Summary of Table 3: the preset next to the best searched fixed width and the best searched decay, by mean and median returned hard error;
+/// in bold if the preset's mean is significantly below both.
 pub(crate) fn summary(records: &[Record]) -> Table {
     let mut table = Table::new([
         "task",
@@ -139,20 +175,20 @@ pub(crate) fn summary(records: &[Record]) -> Table {
             .iter()
             .flatten()
             .all(|other| paired_among(known, &preset.returned, &other.returned).1[1] < 0.0);
-        let shown = short(mean(&preset.returned));
-        let variant = if preset.original { "" } else { ", transfer" };
+        let both = |errors: &[f64]| format!("{}, {}", short(mean(errors)), short(median(errors)));
+        let shown = both(&preset.returned);
         let named = |one: Option<&&Record>| {
             one.map_or(String::new(), |one| {
                 let seeds = match one.returned.len() {
                     count if count == preset.returned.len() => String::new(),
                     count => format!(", {count} seeds"),
                 };
-                format!("{} ({}{seeds})", short(mean(&one.returned)), one.family)
+                format!("{} ({}{seeds})", both(&one.returned), one.family)
             })
         };
         let [fixed, decay] = others.map(named);
         table.push([
-            format!("{}{variant}", preset.task().title()),
+            named_task(preset),
             preset.returned.len().to_string(),
             if clear && known > 0 { format!("**{shown}**") } else { shown },
             fixed,
@@ -210,11 +246,23 @@ fn difference(comparisons: usize, errors: &[f64], reference: &[f64]) -> String {
     if high < 0.0 || low > 0.0 { format!("**{shown}**") } else { shown }
 }
 
+/// Title of the parameter error; none where the hard error stands in for it, as for 2D SHAPE.
+fn parameter_title(one: &Record) -> Option<String> {
+    let [hard, parameter] = &one.titles;
+    (!parameter.starts_with(hard.as_str())).then(|| parameter.clone())
+}
+
+/// Name of the task, with its variant unless that is the original.
+fn named_task(one: &Record) -> String {
+    format!("{}{}", one.task().title(), if one.original { "" } else { ", transfer" })
+}
+
 fn pair(errors: [Option<f64>; 2]) -> String {
     errors.into_iter().flatten().map(short).collect::<Vec<_>>().join(" / ")
 }
 
-/// The table of this name: `tasks`, `summary`, `paper`, `seconds`, `poses`, `crossed`, or `errors TASK VARIANT`; none if there is nothing to show.
+/// The table of this name: `tasks`, `summary`, `paper`, `seconds`, `poses`, `crossed`, `variations`, or `errors TASK VARIANT`; none if there is
+/// nothing to show.
 ///
 /// # Errors
 ///
@@ -227,6 +275,7 @@ pub(crate) fn named(records: &[Record], name: &str) -> anyhow::Result<Option<Tab
         ["paper"] => Some(paper(records)),
         ["seconds"] => Some(seconds(records)),
         ["poses"] => Some(poses(records)),
+        ["variations"] => variations(records),
         ["crossed"] => crate::crossed::crossed(records),
         ["errors", task, variant] => {
             let original = variant == Variant::Original.name();
