@@ -97,6 +97,9 @@ pub(crate) struct Search<A: Args> {
     /// Smallest and largest learning rate to try
     #[arg(long, value_name = "X,X", value_delimiter = ',', value_parser = positive)]
     pub(crate) learning_rates: Vec<f64>,
+    /// Try no surrogate gradients
+    #[arg(long, conflicts_with = "surrogate_scale")]
+    pub(crate) no_surrogate: bool,
     #[command(flatten)]
     pub(crate) training: Training,
     #[command(flatten)]

@@ -58,6 +58,12 @@ impl Default for Common {
     }
 }
 
+/// A number above 0 and at most 1.
+fn share_or_all(text: &str) -> Result<f64, String> {
+    let number = positive(text).ok().filter(|&x| x <= 1.0);
+    number.ok_or_else(|| "expected a number above 0 and at most 1".into())
+}
+
 /// The defaults of all flags.
 ///
 /// # Panics
@@ -91,8 +97,8 @@ pub struct MethodArgs {
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = "Softness")]
     pub learning_rate: Option<f64>,
 
-    /// Learning rate at the last step as a share of the first, reached geometrically
-    #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true, help_heading = RARE)]
+    /// Learning rate at the last step as a share of the first, reached geometrically; 1 for a constant rate
+    #[arg(long, value_name = "SHARE", value_parser = share_or_all, allow_negative_numbers = true, help_heading = RARE)]
     pub rate_end: Option<f64>,
 
     /// Use the squared distance as the softness's input; widths are then in NDC²

@@ -14,7 +14,7 @@ pub struct Method<S = EdgeSoftness> {
     /// Resolution of the image that is optimised.
     #[serde(default)]
     pub resolution: Resolution,
-    /// Largest error of a pixel from culling distant faces; by default [`usual_tolerance`](Method::usual_tolerance).
+    /// Largest error of a pixel, in coverage, from culling and interpolation; by default [`usual_tolerance`](Method::usual_tolerance).
     #[serde(default)]
     pub tolerance: Option<f64>,
 }

@@ -84,8 +84,7 @@ pub trait InverseProblem: 'static {
         self.image(scene, theta, softness)
     }
 
-    /// The loss of an image, `[instances]`. The image may have the pixels a side of the scene,
-    /// halved some times.
+    /// The loss of an image `[views, channels, side, side]`, `[instances]`; `side` is the size of the scene, possibly halved repeatedly.
     fn image_loss<B: RasterBackend>(
         &self,
         scene: &Self::Scene<B>,

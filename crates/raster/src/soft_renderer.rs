@@ -130,6 +130,8 @@ impl<S: Softness> SoftRenderer<S> {
     }
 
     /// Sets the largest error of a pixel, in (0, 1); see [`Profile::new`](crate::low_level::Profile::new).
+    ///
+    /// Drawing panics if `tolerance` is not in (0, 1).
     #[must_use]
     pub fn with_tolerance(self, tolerance: f64) -> Self {
         self.changed(|rasterizer| rasterizer.tolerance = tolerance)
@@ -203,7 +205,7 @@ impl<S: Softness> SoftRenderer<S> {
     }
 
     /// The largest error of a pixel with the renderer's own parameters, in coverage: the tolerance, or more if the softness has a jump or a
-    /// corner that no table can resolve. In exact arithmetic; rounding in `f32` adds about 1e-6.
+    /// corner that no table can resolve. In exact arithmetic; rounding in `f32` adds up to 1e-5.
     ///
     /// ```
     /// use softrast_tensor::NdArray;

@@ -17,7 +17,7 @@ use crate::ImageSize;
 pub enum Width {
     /// The scale of the softness.
     Scale(f64),
-    /// The scale of a softness of the distance in pixels; for a softness of the squared distance, the square root of its scale.
+    /// Pixels: the scale, or for a squared softness the square root of the scale.
     Pixels(f64),
 }
 

@@ -2,7 +2,7 @@ use softrast_tensor::{Backend, Tensor};
 
 /// Light transmitted by a face that the formula makes fully opaque.
 ///
-/// One-sided families reach `s = 1` exactly, where the optical depth `-ln(1 - s)` is infinite. For them it is
+/// Steps that end, such as reversed laws, reach `s = 1` exactly, where the optical depth `-ln(1 - s)` is infinite. For them it is
 /// `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`: at most `-ln(OPAQUE)` = 16.1, and no silhouette changes by more than `OPAQUE`.
 pub const OPAQUE: f64 = 1e-7;
 

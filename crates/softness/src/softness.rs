@@ -163,7 +163,7 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         with_first(first, phi)
     }
 
-    /// [`with_scale`](Softness::with_scale) for numbers.
+    /// Parameters, as numbers, of the step stretched by `factor`: what [`with_scale`](Softness::with_scale) computes on tensors. Override both alike.
     fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
         let mut phi = phi.to_vec();
         phi[0] += factor.ln();

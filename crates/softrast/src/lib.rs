@@ -17,7 +17,7 @@
 //! | read and write meshes | [`Mesh`](mesh::Mesh) | [`fit_masks`] |
 //!
 //! The [`guide`] leads from an image to a fitted mesh. Each module is a crate that can be used
-//! alone; [`prelude`] has the items of most programs. Derivatives are exact to second order. Errors
+//! alone; [`prelude`] has the items of most programs. Derivatives are exact to second order in f64. Errors
 //! in files are returned; wrong shapes panic, with the found and the expected shape.
 //!
 //! [`tensor`] re-exports the tensors, backends and autodiff of burn 0.21; types of other burn releases are incompatible. The Cargo features

@@ -275,7 +275,7 @@ fn a_surrogate_is_learned_kept_and_named() {
     );
 }
 
-/// Source: docs/notes.md, Values before any step. The mesh is not ours and not in this repository.
+/// Source: docs/notes.md, Regression values. The mesh is not ours and not in this repository.
 #[test]
 #[ignore = "needs the paper's meshes"]
 fn the_first_step_with_a_gamma_moves_as_the_released_one() {

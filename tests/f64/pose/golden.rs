@@ -1,6 +1,6 @@
 //! The 24 released pairs on spot compared with recorded values, to 5e-4.
 //!
-//! Source: docs/notes.md, Values before any step. The mesh is third-party and not part of this repository.
+//! Source: docs/notes.md, Regression values. The mesh is third-party and not part of this repository.
 
 use pose::{PoseError, released24};
 use softrast_inverse::{

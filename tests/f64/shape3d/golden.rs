@@ -1,6 +1,6 @@
 //! Values before any step compared with recorded ones, to 5e-4.
 //!
-//! Source: docs/notes.md, Values before any step. The meshes are third-party and not part of this repository.
+//! Source: docs/notes.md, Regression values. The meshes are third-party and not part of this repository.
 
 use shape3d::{Instance, Scene, VIEWS};
 use softrast_mesh::{Mesh, airplane, chair, icosphere};

@@ -91,6 +91,36 @@ fn pages_of_the_book_link_within_it_or_to_the_web() {
     assert!(outside.is_empty(), "take the address of the repository on the web:\n{found}");
 }
 
+#[test]
+fn every_example_and_benchmark_that_a_command_names_exists() {
+    let sources = files(root(), "rs");
+    let exists = |folder: &str, name: &str| {
+        let [file, with_parts] =
+            [format!("{folder}/{name}.rs"), format!("{folder}/{name}/main.rs")];
+        sources.iter().any(|path| path.ends_with(&file) || path.ends_with(&with_parts))
+    };
+    let scripts = fs::read_dir(root().join(".ci")).unwrap().map(|entry| entry.unwrap().path());
+    let (mut missing, mut count) = (Vec::new(), 0);
+    for page in files(root(), "md").into_iter().chain(scripts) {
+        let text = fs::read_to_string(&page).unwrap();
+        for (flag, folder) in [("--example ", "examples"), ("--bench ", "benches")] {
+            for (at, _) in text.match_indices(flag) {
+                let named = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+                let rest = &text[at + flag.len()..];
+                let name = &rest[..rest.find(|c| !named(c)).unwrap_or(rest.len())];
+                count += usize::from(!name.is_empty());
+                // Logs name what there was, and a capital letter stands for any name.
+                let is_log = page.starts_with(root().join("docs/log"));
+                if !name.is_empty() && !is_log && !exists(folder, name) {
+                    missing.push(format!("  {}: {flag}{name}", shown(&page)));
+                }
+            }
+        }
+    }
+    assert!(count > 20, "commands are found, not {count} alone");
+    assert!(missing.is_empty(), "there is no such file:\n{}", missing.join("\n"));
+}
+
 /// Why a link on a page leads nowhere, if it does not.
 fn fault(page: &Path, link: &str) -> Option<String> {
     let on_the_web = ON_THE_WEB.iter().find_map(|start| link.strip_prefix(start));

@@ -167,7 +167,7 @@ fn space<T: Task>(
     let ends = if method.schedule == Some(Schedule::Static) { none } else { &around };
     let optional = method.schedule != Some(Schedule::Decay);
     let end = SearchAxis { optional, ..axis("scale-end", method.scale_end, ends) };
-    let has_surrogate = T::MOVES_EDGES && base.task.faces().is_some();
+    let has_surrogate = T::MOVES_EDGES && base.task.faces().is_some() && !flags.no_surrogate;
     let wider: Vec<f64> =
         around.iter().flat_map(|scale| SURROGATES.map(|ratio| scale * ratio)).collect();
     let wider = if has_surrogate && method.surrogate_scale.is_none() { &wider } else { none };

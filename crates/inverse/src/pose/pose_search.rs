@@ -88,13 +88,13 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
         self
     }
 
-    /// Sets the number of steps at high resolution.
+    /// Sets the number of steps at high resolution: 20 by default, 80 by colour.
     #[must_use]
     pub fn with_fine_steps(self, steps: usize) -> Self {
         Self { fine_steps: Some(steps), ..self }
     }
 
-    /// Sets the pixels a side at high resolution.
+    /// Sets the pixels a side at high resolution, 128 by default.
     #[must_use]
     pub fn with_fine_size(self, size: usize) -> Self {
         Self { fine_size: size, ..self }

@@ -57,18 +57,18 @@ fn texture_size(mesh: &Mesh, views: &[PaintedView]) -> usize {
     side.clamp(SIZES[0], MOST).next_power_of_two()
 }
 
-/// The mesh with a texture that some views show, of `size` × `size` texels, or of about one for each pixel of the pictures. Its shape stays. Mesh and
+/// The mesh with a texture found from `views`, of `size` × `size` texels, or of about one for each pixel of the pictures. Its shape stays. Mesh and
 /// cameras may be anywhere, in any unit.
 ///
-/// The surface is [`Unwrapped`] into charts, whose margins have the colours beside them. Texels start as the colours of the vertices of `fine` show them: the
-/// same mesh, cut by [`Mesh::subdivided`] some times. The gradient of what the views read of the texels ([`TexelReads`]) brings these to the least squared
+/// The surface is [`Unwrapped`] into charts, whose margins repeat the colours of their edges. Texels start at the vertex colours of `fine`, the
+/// same mesh after some calls of [`Mesh::subdivided`]. The gradient of what the views read of the texels ([`TexelReads`]) brings these to the least squared
 /// differences to all views. A pixel counts as much as its mask says, times the squared cosine between the surface and the direction to the camera. Places
-/// that no view shows take the colours around them. `told` gets the steps taken and the mean squared difference. It runs on the CPU, and its result does not
+/// that no view shows take the colours around them. `told` gets the steps taken and the mean squared difference; its error ends the search and is returned in `stopped`. It runs on the CPU, and its result does not
 /// depend on the number of threads.
 ///
 /// # Errors
 ///
-/// If `size` is not one of [`FoundTexture::SIZES`] or between them, or too small for the charts; if there is no view, a mask is empty or full, or no camera has the mesh before it;
+/// If `size` is not one of [`FoundTexture::SIZES`] or between them, or too small for the charts; if there is no view, a mask is empty or full, or the mesh lies behind all cameras;
 /// if `fine` has no colours, or is not the mesh after some cuts.
 pub fn paint_texture(
     mesh: &Mesh,

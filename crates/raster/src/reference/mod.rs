@@ -44,7 +44,8 @@ pub struct Scene<'a> {
     pub size: ImageSize,
 }
 
-/// Sums of `g(s(d))` over the faces of each pixel: `[views, height, width]`, top row first.
+/// Sums of `g(s(d))` over the faces of each pixel: `[views, height, width]`, top row first. `vertices` are `[views, vertices, 3]`, x and y in
+/// NDC and depth; `phi` is `[parameters]`.
 ///
 /// Computed in chunks of pixels of one view, so that memory stays bounded; under autodiff the tape still holds all chunks, see [`vjp`] for
 /// a gradient that does not. Faces with a vertex nearer than [`NEAR`] are excluded.
