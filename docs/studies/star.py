@@ -14,7 +14,8 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-SIZE, SAMPLES, AWAY, FOCAL = 512, 2, 10.0, 5.0  # pixels, samples a side of a pixel, units, widths of the picture
+# Pixels, samples a side of a pixel, units, widths of the picture. A full ball would lose a pixel at each side.
+SIZE, SAMPLES, AWAY, FOCAL = 512, 2, 10.0, 5.0
 
 
 def cameras():

@@ -93,6 +93,30 @@ mod tests {
     }
 
     #[test]
+    fn a_change_stands_next_to_the_method_whose_whole_name_it_follows() {
+        let line = RECORD.replace('\n', " ");
+        let of = |method: &str, error: &str, varied: bool| {
+            let line = line.replace("\"preset\"", &format!("\"{method}\""));
+            let line = line.replace("[0.1, 0.2]", &format!("[{error}, {error}]"));
+            line.replace("\"varied\": false", &format!("\"varied\": {varied}"))
+        };
+        let lines = [
+            of("learned", "0.1", false),
+            of("learned-mlp", "0.2", false),
+            of("learned-mlp resolution 32", "0.4", true),
+            of("exp backend flex", "0.5", true),
+        ];
+        let records = records::read(&lines.join("\n")).unwrap();
+        let table = tables::named(&records, "variations").unwrap().unwrap().markdown();
+        assert!(
+            table.contains("| POSE | learned-mlp | resolution 32 | 0.200 | 0.400 |"),
+            "{table}"
+        );
+        assert!(table.contains("| POSE | exp backend flex |  |  | 0.500 |"), "{table}");
+        assert!(tables::named(&records[..2], "variations").unwrap().is_none());
+    }
+
+    #[test]
     fn a_table_that_cannot_be_made_is_said() {
         for (text, part) in [
             ("<!-- table tasks -->\n", "the table tasks has no end"),

@@ -79,7 +79,7 @@ pub(crate) fn errors(group: &[&Record]) -> Table {
     table
 }
 
-/// Methods with one property changed, next to the method as it is; none if there are no such records.
+/// Methods with one property changed, next to the method as it is, if that is among the records; none if no record is changed.
 pub(crate) fn variations(records: &[Record]) -> Option<Table> {
     let mut table = Table::new([
         "task",
@@ -93,16 +93,20 @@ pub(crate) fn variations(records: &[Record]) -> Option<Table> {
     let mut any = false;
     for group in by_variant(records) {
         for one in group.iter().filter(|one| one.varied) {
-            let of = |other: &&&Record| !other.varied && one.method.starts_with(&other.method);
-            let Some(whole) = group.iter().find(of) else { continue };
             any = true;
+            let change = |whole: &Record| one.method.strip_prefix(&whole.method)?.strip_prefix(' ');
+            let whole = group.iter().filter(|other| !other.varied && change(other).is_some());
+            let whole = whole.max_by_key(|other| other.method.len());
+            let [error, seconds] = whole.map_or([String::new(), String::new()], |whole| {
+                [short(mean(&whole.returned)), short(whole.seconds)]
+            });
             table.push([
                 named_task(one),
-                whole.method.clone(),
-                one.method[whole.method.len()..].trim().to_owned(),
-                short(mean(&whole.returned)),
+                whole.map_or(one, |whole| whole).method.clone(),
+                whole.and_then(|whole| change(whole)).unwrap_or_default().to_owned(),
+                error,
                 short(mean(&one.returned)),
-                short(whole.seconds),
+                seconds,
                 short(one.seconds),
             ]);
         }

@@ -165,7 +165,7 @@ impl LearnConfig {
             "feedback moves the learning rate itself: leave out --rate-end, or begin with a softness without one"
         );
         ensure!(
-            softness.rate_end.is_none() || outer_loss == OuterLoss::Returned,
+            softness.rate_end.is_none_or(|end| end == 1.0) || outer_loss == OuterLoss::Returned,
             "a rate that falls is followed where runs are judged by what they return: leave out --rate-end, or add --outer-loss returned"
         );
         ensure!(

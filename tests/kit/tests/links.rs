@@ -100,17 +100,20 @@ fn every_example_and_benchmark_that_a_command_names_exists() {
         sources.iter().any(|path| path.ends_with(&file) || path.ends_with(&with_parts))
     };
     let scripts = fs::read_dir(root().join(".ci")).unwrap().map(|entry| entry.unwrap().path());
+    let scripts = scripts.filter(|path| path.is_file());
     let (mut missing, mut count) = (Vec::new(), 0);
     for page in files(root(), "md").into_iter().chain(scripts) {
-        let text = fs::read_to_string(&page).unwrap();
+        let text = String::from_utf8_lossy(&fs::read(&page).unwrap()).into_owned();
         for (flag, folder) in [("--example ", "examples"), ("--bench ", "benches")] {
             for (at, _) in text.match_indices(flag) {
-                let named = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+                let named =
+                    |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_-".contains(c);
                 let rest = &text[at + flag.len()..];
                 let name = &rest[..rest.find(|c| !named(c)).unwrap_or(rest.len())];
                 count += usize::from(!name.is_empty());
-                // Logs name what there was, and a capital letter stands for any name.
-                let is_log = page.starts_with(root().join("docs/log"));
+                // Logs and the changelog name what there was; NAME stands for any name.
+                let is_log =
+                    page.starts_with(root().join("docs/log")) || page.ends_with("CHANGELOG.md");
                 if !name.is_empty() && !is_log && !exists(folder, name) {
                     missing.push(format!("  {}: {flag}{name}", shown(&page)));
                 }

@@ -150,6 +150,11 @@ fn space<T: Task>(
     if !is_family && !flags.scales.is_empty() {
         return Err(Error::usage("a softness file holds its own scale: leave out --scales"));
     }
+    if flags.no_surrogate && base.method.softness.surrogate.is_some() && !is_family {
+        return Err(Error::usage(
+            "a softness file holds its own surrogate: leave out --no-surrogate",
+        ));
+    }
     let around = match (is_family, flags.scales.as_slice()) {
         (false, _) => Vec::new(),
         (_, []) => T::searched_scales(scales_around(&base.method.softness, base.solve.size)),
