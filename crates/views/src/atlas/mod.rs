@@ -1,19 +1,19 @@
 //! One picture for all faces of a mesh.
 
-use std::collections::HashMap;
+mod layout;
+mod pictures;
+mod texels;
 
 use anyhow::{Error, anyhow};
-use image::{Rgb, RgbImage};
-use softrast_mesh::{Mesh, Texture, from_linear, to_linear};
+use image::RgbImage;
+use softrast_mesh::Mesh;
 
-use crate::PictureFile;
+use self::{
+    layout::{Layout, WHITE},
+    pictures::Pictures,
+    texels::{between, texels},
+};
 
-/// sRGB colour of faces without picture and colours.
-const GREY: [f64; 3] = [0.7; 3];
-/// Texels along a side of the square of a face whose colours differ between corners.
-const SMALLEST: usize = 4;
-/// Texels around a part of a picture.
-const MARGIN: i64 = 1;
 /// Most reductions of pictures until everything fits.
 const MOST_ROUNDS: usize = 8;
 
@@ -71,7 +71,9 @@ impl Atlas {
             let placed = layout.placed();
             let texels = placed.width as f64 * placed.height as f64;
             if texels <= most as f64 {
-                return (Some(layout.drawn(&placed, texture, &pictures)), errors);
+                let (coordinates, corners) = layout.coordinates(&placed);
+                let picture = layout.drawn(&placed, texture, &pictures);
+                return (Some(Self { coordinates, corners, picture }), errors);
             }
             // Margins do not shrink with the pictures.
             let share = 0.8 * most as f64 / texels;
@@ -142,322 +144,15 @@ const MOST_TEXELS: usize = 1 << 22;
 /// Barycentric weights of the sample points of a vertex: the corner itself, and three points around it.
 const AROUND: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.7, 0.3, 0.0], [0.7, 0.0, 0.3], [0.6, 0.2, 0.2]];
 
-const WHITE: [f64; 3] = [1.0; 3];
-
-/// The texels of the pictures of a texture.
-struct Pictures {
-    /// By the address of their files in memory, so that each is decoded once.
-    of_files: HashMap<*const u8, Option<RgbImage>>,
-    of_materials: Vec<Option<*const u8>>,
-}
-
-impl Pictures {
-    /// Pictures that are not decoded yet.
-    fn of(texture: &Texture) -> Self {
-        let mut is_used = vec![false; texture.materials().len()];
-        texture.of_faces().iter().for_each(|&number| is_used[number as usize] = true);
-        let key = |(material, used): (&softrast_mesh::Material, bool)| {
-            material.picture().filter(|_| used).map(<[u8]>::as_ptr)
-        };
-        let of_materials = texture.materials().iter().zip(is_used).map(key).collect();
-        Self { of_files: HashMap::new(), of_materials }
-    }
-
-    /// Decodes pictures again: at most `most` texels in total, and at most `limit` of its current number of texels for each.
-    fn reduce(&mut self, texture: &Texture, most: usize, limit: impl Fn(f64) -> f64) -> Vec<Error> {
-        let mut errors = vec![];
-        let mut done = HashMap::new();
-        let of_materials = self.of_materials.iter().zip(texture.materials());
-        let mut files: Vec<_> =
-            of_materials.filter_map(|(key, it)| key.zip(it.picture())).collect();
-        files.sort_unstable();
-        files.dedup();
-        let each = (most / files.len().max(1)).max(1);
-        for (key, file) in files {
-            let known = self.of_files.get(&key);
-            let texels = match known {
-                Some(None) => {
-                    done.insert(key, None);
-                    continue;
-                }
-                Some(Some(now)) => (limit(f64::from(now.width() * now.height())) as usize).max(1),
-                None => each,
-            };
-            let decoded = PictureFile::decode(file).map(|file| file.texels(texels.min(each)));
-            done.insert(key, decoded.map_err(|error| errors.push(error)).ok());
-        }
-        self.of_files = done;
-        errors
-    }
-
-    fn of_material(&self, number: usize) -> Option<&RgbImage> {
-        self.of_files.get(&self.of_materials[number]?)?.as_ref()
-    }
-}
-
-/// A part of the atlas.
-#[derive(Clone, Copy)]
-struct Patch {
-    size: [usize; 2],
-    fill: Fill,
-}
-
-/// The content of a patch.
-#[derive(Clone, Copy)]
-enum Fill {
-    /// The picture of a material from this texel on.
-    Cut { material: usize, low: [i64; 2] },
-    /// A face, with its first corner at the upper left, the second at the right, the third below: linear colours of its corners, times the
-    /// picture of a material, on which the corners are at these texels.
-    Face { light: [[f64; 3]; 3], shown: Option<(usize, [[f64; 2]; 3])> },
-}
-
-/// A box around texels: the first and the last.
-type Bounds = [[i64; 2]; 2];
-
-/// The patches, and the positions of faces on them.
-struct Layout {
-    patches: Vec<Patch>,
-    /// The patch of each face, and its corners in texels from the patch's upper left corner.
-    faces: Vec<(usize, [[f64; 2]; 3])>,
-}
-
-/// Positions of patches.
-struct Placed {
-    width: usize,
-    height: usize,
-    at: Vec<[usize; 2]>,
-}
-
-impl Layout {
-    fn of(mesh: &Mesh, texture: &Texture, pictures: &Pictures) -> Self {
-        let mut layout = Self { patches: vec![], faces: Vec::with_capacity(mesh.faces().len()) };
-        let shared = layout.add_shared(mesh, texture, pictures);
-        let mut flat = HashMap::new();
-        for (face, uv) in uv_of_faces(texture).enumerate() {
-            let number = texture.of_faces()[face] as usize;
-            let (material, picture) = (&texture.materials()[number], pictures.of_material(number));
-            let is_lit = picture.is_none() || texture.multiplies_colours();
-            let colours = mesh.colours().filter(|_| is_lit);
-            let next = layout.patches.len();
-            if let (Some(picture), None) = (picture, colours) {
-                let corners = shifted(uv.map(|uv| texels(uv, picture)), picture);
-                let (patch, low) = shared[number].unwrap_or_else(|| {
-                    let around = bounds(corners);
-                    let fill = Fill::Cut { material: number, low: around[0] };
-                    layout.patches.push(Patch { size: size(around), fill });
-                    (next, around[0])
-                });
-                layout.faces.push((patch, from(corners, low)));
-                continue;
-            }
-            let plain = if picture.is_none() && material.factor() == WHITE { GREY } else { WHITE };
-            let light = [0, 1, 2].map(|k| {
-                let own = colours.map_or(plain, |all| all[mesh.faces()[face][k] as usize]);
-                [0, 1, 2].map(|c| to_linear(own[c]) * material.factor()[c])
-            });
-            let shown = picture.map(|picture| (number, uv.map(|uv| texels(uv, picture))));
-            let longest = shown.map_or(0.0, |(_, corners)| {
-                let edge = |k: usize| length(corners[k], corners[(k + 1) % 3]);
-                (0..3).map(edge).fold(0.0, f64::max)
-            });
-            let fill = Fill::Face { light, shown };
-            if shown.is_none() && light[0] == light[1] && light[1] == light[2] {
-                let patch = *flat.entry(light[0].map(f64::to_bits)).or_insert(next);
-                if patch == next {
-                    layout.patches.push(Patch { size: [2; 2], fill });
-                }
-                layout.faces.push((patch, [[1.0; 2]; 3]));
-                continue;
-            }
-            let side = SMALLEST.max(longest.ceil() as usize + 1);
-            layout.patches.push(Patch { size: [side; 2], fill });
-            let far = side as f64 - 0.5;
-            layout.faces.push((next, [[0.5, 0.5], [far, 0.5], [0.5, far]]));
-        }
-        layout
-    }
-
-    /// Adds a patch for each material whose faces overlap so much that one patch for all of them is smaller than one for each. Returns the
-    /// patch and its first texel for each of these materials.
-    fn add_shared(
-        &mut self,
-        mesh: &Mesh,
-        texture: &Texture,
-        pictures: &Pictures,
-    ) -> Vec<Option<(usize, [i64; 2])>> {
-        let materials = texture.materials().len();
-        if texture.multiplies_colours() && mesh.colours().is_some() {
-            return vec![None; materials];
-        }
-        let mut all: Vec<Option<(Bounds, f64)>> = vec![None; materials];
-        for (uv, &number) in uv_of_faces(texture).zip(texture.of_faces()) {
-            let Some(picture) = pictures.of_material(number as usize) else { continue };
-            let own = bounds(shifted(uv.map(|uv| texels(uv, picture)), picture));
-            let (around, sum) = all[number as usize].get_or_insert((own, 0.0));
-            *around = joined(*around, own);
-            *sum += texels_in(own);
-        }
-        let mut add = |(number, found): (usize, Option<(Bounds, f64)>)| {
-            let (around, _) = found.filter(|&(around, sum)| texels_in(around) <= sum)?;
-            let fill = Fill::Cut { material: number, low: around[0] };
-            self.patches.push(Patch { size: size(around), fill });
-            Some((self.patches.len() - 1, around[0]))
-        };
-        all.into_iter().enumerate().map(&mut add).collect()
-    }
-
-    /// Packs patches on shelves, the highest first.
-    fn placed(&self) -> Placed {
-        let mut order = Vec::from_iter(0..self.patches.len());
-        order.sort_by_key(|&k| std::cmp::Reverse(self.patches[k].size[1]));
-        let texels: f64 =
-            self.patches.iter().map(|patch| (patch.size[0] as f64) * patch.size[1] as f64).sum();
-        let widest = self.patches.iter().map(|patch| patch.size[0]).max().unwrap_or(1);
-        let width = widest.max(texels.sqrt().ceil() as usize);
-        let mut at = vec![[0; 2]; self.patches.len()];
-        let ([mut x, mut y], mut shelf) = ([0, 0], 0);
-        for k in order {
-            let [wide, high] = self.patches[k].size;
-            if x + wide > width {
-                (x, y, shelf) = (0, y + shelf, 0);
-            }
-            at[k] = [x, y];
-            shelf = shelf.max(high);
-            x += wide;
-        }
-        Placed { width, height: (y + shelf).max(1), at }
-    }
-
-    fn drawn(&self, placed: &Placed, texture: &Texture, pictures: &Pictures) -> Atlas {
-        let mut picture = RgbImage::new(placed.width as u32, placed.height as u32);
-        for (patch, &[left, top]) in self.patches.iter().zip(&placed.at) {
-            for y in 0..patch.size[1] {
-                for x in 0..patch.size[0] {
-                    let colour = patch.texel([x, y], texture, pictures);
-                    picture.put_pixel((left + x) as u32, (top + y) as u32, Rgb(colour));
-                }
-            }
-        }
-        let [width, height] = [placed.width, placed.height].map(|side| side as f64);
-        let place = |&(patch, corners): &(usize, [[f64; 2]; 3])| {
-            let [left, top] = placed.at[patch].map(|k| k as f64);
-            corners.map(|[x, y]| [(left + x) / width, 1.0 - (top + y) / height])
-        };
-        let coordinates = self.faces.iter().flat_map(place).collect();
-        let corners = (0..self.faces.len() as u32).map(|face| [0, 1, 2].map(|k| 3 * face + k));
-        Atlas { coordinates, corners: corners.collect(), picture }
-    }
-}
-
-impl Patch {
-    /// The colour of a texel.
-    fn texel(&self, [x, y]: [usize; 2], texture: &Texture, pictures: &Pictures) -> [u8; 3] {
-        match self.fill {
-            Fill::Cut { material, low } => {
-                let Some(picture) = pictures.of_material(material) else { return [0; 3] };
-                let levels = repeated(picture, low[0] + x as i64, low[1] + y as i64);
-                let factor = texture.materials()[material].factor();
-                if factor == WHITE {
-                    return levels;
-                }
-                let share = |k: usize| to_linear(f64::from(levels[k]) / 255.0) * factor[k];
-                [0, 1, 2].map(|k| byte(from_linear(share(k))))
-            }
-            Fill::Face { light, shown } => {
-                let [right, down] = [x, y].map(|k| k as f64 / (self.size[0] - 1) as f64);
-                let weights = [1.0 - right - down, right, down];
-                let sum = |of: [f64; 3]| (0..3).map(|k| weights[k] * of[k]).sum::<f64>();
-                let light = [0, 1, 2].map(|c| sum(light.map(|colour| colour[c])).clamp(0.0, 1.0));
-                let picture = shown.and_then(|(material, corners)| {
-                    let place = [0, 1].map(|k| sum(corners.map(|corner| corner[k])));
-                    Some(between(place, pictures.of_material(material)?))
-                });
-                let levels = picture.unwrap_or(WHITE);
-                [0, 1, 2].map(|c| byte(from_linear(to_linear(levels[c]) * light[c])))
-            }
-        }
-    }
-}
-
-fn byte(level: f64) -> u8 {
-    (255.0 * level.clamp(0.0, 1.0)).round() as u8
-}
-
-fn length(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (b[0] - a[0]).hypot(b[1] - a[1])
-}
-
-fn uv_of_faces(texture: &Texture) -> impl Iterator<Item = [[f64; 2]; 3]> {
-    let at = |k: u32| texture.coordinates()[k as usize];
-    texture.corners().iter().map(move |corners| corners.map(at))
-}
-
-/// A coordinate in texels of a picture, from its upper left corner.
-fn texels([u, v]: [f64; 2], picture: &RgbImage) -> [f64; 2] {
-    [u * f64::from(picture.width()), (1.0 - v) * f64::from(picture.height())]
-}
-
-/// Corners moved by whole pictures, so that the lowest are in the first.
-fn shifted(corners: [[f64; 2]; 3], picture: &RgbImage) -> [[f64; 2]; 3] {
-    let sides = [picture.width(), picture.height()].map(f64::from);
-    let lowest =
-        [0, 1].map(|k| corners.iter().map(|corner| corner[k]).fold(f64::INFINITY, f64::min));
-    let back = [0, 1].map(|k| (lowest[k] / sides[k]).floor() * sides[k]);
-    corners.map(|corner| [0, 1].map(|k| corner[k] - back[k]))
-}
-
-/// The texels needed by a triangle, including margins.
-fn bounds(corners: [[f64; 2]; 3]) -> Bounds {
-    let of = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
-        let all = corners.iter().map(|corner| corner[k]);
-        (all.fold(start, pick) - 0.5).floor() as i64
-    };
-    [
-        [0, 1].map(|k| of(k, f64::min, f64::INFINITY) - MARGIN),
-        [0, 1].map(|k| of(k, f64::max, f64::NEG_INFINITY) + 1 + MARGIN),
-    ]
-}
-
-fn joined([low, high]: [[i64; 2]; 2], other: [[i64; 2]; 2]) -> [[i64; 2]; 2] {
-    [[0, 1].map(|k| low[k].min(other[0][k])), [0, 1].map(|k| high[k].max(other[1][k]))]
-}
-
-fn size([low, high]: [[i64; 2]; 2]) -> [usize; 2] {
-    [0, 1].map(|k| (high[k] - low[k] + 1) as usize)
-}
-
-fn texels_in(bounds: [[i64; 2]; 2]) -> f64 {
-    let [width, height] = size(bounds);
-    width as f64 * height as f64
-}
-
-/// Corners in texels relative to `low`.
-fn from(corners: [[f64; 2]; 3], low: [i64; 2]) -> [[f64; 2]; 3] {
-    corners.map(|corner| [0, 1].map(|k| corner[k] - low[k] as f64))
-}
-
-/// The levels of a texel of a repeating picture.
-fn repeated(picture: &RgbImage, x: i64, y: i64) -> [u8; 3] {
-    let [x, y] = [(x, picture.width()), (y, picture.height())]
-        .map(|(k, side)| k.rem_euclid(i64::from(side)) as u32);
-    picture.get_pixel(x, y).0
-}
-
-/// The colour interpolated between the centres of the four texels around a position, from 0 to 1.
-fn between([x, y]: [f64; 2], picture: &RgbImage) -> [f64; 3] {
-    let [x, y] = [x - 0.5, y - 0.5];
-    let [left, above] = [x.floor(), y.floor()];
-    let mix = |a: [f64; 3], b: [f64; 3], part: f64| [0, 1, 2].map(|k| a[k] + part * (b[k] - a[k]));
-    let texel = |x: i64, y: i64| repeated(picture, x, y).map(|level| f64::from(level) / 255.0);
-    let row = |y: i64| mix(texel(left as i64, y), texel(left as i64 + 1, y), x - left);
-    mix(row(above as i64), row(above as i64 + 1), y - above)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use softrast_mesh::{Material, icosphere};
+    use super::{
+        layout::{GREY, byte},
+        *,
+    };
+    use crate::PictureFile;
+    use image::Rgb;
+    use softrast_mesh::{Material, Texture, from_linear, icosphere, to_linear};
 
     /// A picture with different colours in adjacent texels, as a PNG file.
     fn png(width: u32, height: u32, seed: u32) -> Vec<u8> {
