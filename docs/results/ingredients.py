@@ -24,13 +24,13 @@ PANELS = [
         ("fixed\nwidth", "687 runs", "gauss static scale 0.00522 learning-rate 0.0387"),
         ("narrowing\nwidth", "687 runs", "gauss decay scale 0.0155 scale-end 0.00354 learning-rate 0.033"),
         ("with a\nsurrogate", "390 runs", "logistic decay"),
-        ("and a fall-\ning rate", "687 runs", "gauss decay scale 0.00726 scale-end 0.00132 surrogate-scale 0.0229 learning-rate 0.101 rate-end 0.0751"),
+        ("and a\nfalling rate", "687 runs", "gauss decay scale 0.00726 scale-end 0.00132 surrogate-scale 0.0229 learning-rate 0.101 rate-end 0.0751"),
         ("the same,\nlearned", "672 runs", "shape3d-learned"),
     ]),
     ("2D SHAPE: error", "shape2d", [
         ("fixed\nwidth", "394 runs", "gauss static"),
         ("narrowing\nwidth", "394 runs", "gauss decay"),
-        ("and a fall-\ning rate", "394 runs", "gauss decay scale 0.0426 scale-end 9.18e-4 learning-rate 0.00982 rate-end 0.127"),
+        ("and a\nfalling rate", "394 runs", "gauss decay scale 0.0426 scale-end 9.18e-4 learning-rate 0.00982 rate-end 0.127"),
         ("the same,\nlearned", "368 runs", "shape2d-learned"),
     ]),
     ("OCCLUSION: error", "occlusion", [
@@ -118,7 +118,7 @@ def table(known):
 
 def panel(title, task, methods, known):
     x = lambda step: LEFT + 34 + (WIDTH - LEFT - RIGHT - 54) * step / (len(methods) - 1)
-    y = lambda percent: TOP + (HEIGHT - TOP - BOTTOM) * (1 - min(percent, MOST) / MOST)
+    y = lambda percent: TOP + (HEIGHT - TOP - BOTTOM) * (1 - min(max(percent, 0), MOST) / MOST)
     yield f'<text x="{LEFT}" y="18" font-weight="bold">{title}</text>'
     for percent in range(0, 101, 25):
         yield f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(percent):.1f}" y2="{y(percent):.1f}" stroke="#ddd"/>'
