@@ -34,7 +34,7 @@ PANELS = [
         ("the same,\nlearned", "368 runs", "shape2d-learned"),
     ]),
     ("OCCLUSION: error", "occlusion", [
-        ("rate given,\nfixed width", "936 runs", "gauss static scale 1.68e-4 learning-rate 0.7"),
+        ("rate given,\nfixed width", "936 runs", "gauss static scale 1.68e-4 learning-rate 0.7 depth-scale 0.29"),
         ("rate given,\nlearned", "3,700 runs", "learned"),
         ("searched,\nfixed width", "960 runs", "gauss static"),
         ("searched,\nnarrowing", "960 runs", "gauss decay"),
