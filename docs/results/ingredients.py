@@ -11,7 +11,7 @@ import statistics
 
 FOLDER = pathlib.Path(__file__).parent
 COLOURS = {True: "#1f6f8b", False: "#b3541e"}
-# Of each panel its title, task, and methods: label, runs of its search or learning, name in the records.
+# Title, task and methods of each panel; a method has a label, the runs of its search or learning, and a name in the records.
 PANELS = [
     ("POSE: cameras beyond 5°", "pose", [
         ("fixed\nwidth", "960 runs", "logistic static scale 0.00144 learning-rate 1.33"),

@@ -31,7 +31,7 @@ fn pictures(folder: &Path, opaque: bool) {
     pictures_of(&ball(), folder, opaque);
 }
 
-/// The same of another mesh.
+/// Pictures of another mesh.
 fn pictures_of(mesh: &Mesh, folder: &Path, opaque: bool) {
     let size = [60usize, 44];
     let frame = |k: usize| {

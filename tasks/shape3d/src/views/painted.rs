@@ -19,16 +19,16 @@ const SIZE: usize = 128;
 
 /// A view in colour, and the result from there.
 pub(super) struct Colours {
-    /// In decibels: of the texture, or else of the colours of vertices.
+    /// PSNR of the texture in decibels, or else of the colours of vertices.
     pub(super) psnr: Option<f64>,
-    /// Of the colours of vertices.
+    /// PSNR of the colours of vertices.
     pub(super) psnr_of_vertices: Option<f64>,
     /// The picture and the result over black, for a page.
     pub(super) pair: [RgbImage; 2],
 }
 
 impl Colours {
-    /// Of a mesh with colours at its vertices, and one with the texture.
+    /// Colours of a mesh with colours at its vertices, and of one with the texture.
     pub(super) fn new(view: &PaintedView, mesh: &Mesh, textured: Option<&Textured>) -> Self {
         let ImageSize { height, width } = view.view.camera.size;
         let image = |planes: Vec<f64>| for_page(rgb_from_planes(&planes, width, height));
