@@ -9,7 +9,6 @@ use std::{
     mem::offset_of,
     panic::{AssertUnwindSafe, catch_unwind},
     ptr::{self, NonNull},
-    slice,
 };
 
 use pyo3::{prelude::*, types::PyCapsule};
@@ -28,9 +27,8 @@ const MINOR_TO: c_int = 3;
 
 const EXTENSION_METADATA: c_int = 1;
 const STAGE_EXECUTE: c_int = 3;
-const ATTRIBUTE_SCALAR: c_int = 3;
 const BUFFER: c_int = 1;
-const S64: c_int = 5;
+const S32: c_int = 4;
 const F32: c_int = 11;
 const F64: c_int = 12;
 const INVALID_ARGUMENT: c_int = 3;
@@ -107,28 +105,6 @@ struct Buffers {
 }
 
 #[repr(C)]
-struct ByteSpan {
-    bytes: *const u8,
-    length: usize,
-}
-
-#[repr(C)]
-struct Scalar {
-    dtype: c_int,
-    value: *const i64,
-}
-
-#[repr(C)]
-struct Attributes {
-    struct_size: usize,
-    extension_start: *mut Extension,
-    size: i64,
-    types: *const c_int,
-    names: *const *const ByteSpan,
-    values: *const *const Scalar,
-}
-
-#[repr(C)]
 struct CallFrame {
     struct_size: usize,
     extension_start: *mut Extension,
@@ -137,11 +113,11 @@ struct CallFrame {
     stage: c_int,
     arguments: Buffers,
     results: Buffers,
-    attributes: Attributes,
 }
 
-/// The handler that `jax.ffi.register_ffi_target` takes, as a capsule. Calls have the attributes `function` (its `id`), `order` (the place of the
-/// derivative among "value", "image", "jvp", "vjp" and "vjp_of_vjp"), `along` and `wanted` (a bit for each flag, the lowest first), all int64.
+/// The handler that `jax.ffi.register_ffi_target` takes, as a capsule. The first argument of a call is settings, four int64 as int32 `[8]`: the `id`
+/// of a function, the place of the derivative among "value", "image", "jvp", "vjp" and "vjp_of_vjp", and `along` and `wanted`, a bit for each flag, the
+/// lowest first.
 #[pyfunction]
 pub(crate) fn xla_handler(py: Python<'_>) -> PyResult<Bound<'_, PyCapsule>> {
     let handler: unsafe extern "C" fn(*mut CallFrame) -> *mut Error = handle;
@@ -213,26 +189,23 @@ fn describe(metadata: &mut Metadata, api: Option<&Api>) {
 /// `frame` must be one of XLA's that executes.
 unsafe fn execute(frame: &CallFrame) -> Result<(), String> {
     // SAFETY: the caller's.
-    let (attributes, arguments, results) = unsafe {
-        (attributes(&frame.attributes)?, buffers(&frame.arguments)?, buffers(&frame.results)?)
-    };
-    let attribute = |name: &str| {
-        let found = attributes.iter().find(|(known, _)| *known == name.as_bytes());
-        found.map(|&(_, value)| value).ok_or_else(|| format!("the attribute {name} is missing"))
-    };
-    let function = Known::find(attribute("function")?).ok_or(
+    let (arguments, results) = unsafe { (buffers(&frame.arguments)?, buffers(&frame.results)?) };
+    let (first, arguments) = arguments.split_first().ok_or("a call has no settings")?;
+    // SAFETY: the caller's.
+    let [id, place, along, wanted] = unsafe { settings(first)? };
+    let function = Known::find(id).ok_or(
         "the renderer of a compiled function is gone, or is of another process: compile it again, and keep the renderer as long",
     )?;
-    let place = usize::try_from(attribute("order")?).ok();
+    let place = usize::try_from(place).ok();
     let (_, order) =
         place.and_then(|place| Order::ALL.get(place)).ok_or("there is no such derivative")?;
-    let [along, wanted] = function.flags(*order);
+    let [count_along, count_wanted] = function.flags(*order);
     let flags = |bits: i64, count: usize| (0..count).map(|k| (bits >> k) & 1 == 1).collect();
-    let along: Vec<bool> = flags(attribute("along")?, along);
-    let wanted: Vec<bool> = flags(attribute("wanted")?, wanted);
+    let along: Vec<bool> = flags(along, count_along);
+    let wanted: Vec<bool> = flags(wanted, count_wanted);
     // SAFETY: XLA's buffers have the lengths that their shapes say, and arguments stay as they are while this runs.
     let arrays: Vec<_> =
-        arguments.into_iter().map(|buffer| unsafe { array(buffer) }).collect::<Result<_, _>>()?;
+        arguments.iter().map(|buffer| unsafe { array(buffer) }).collect::<Result<_, _>>()?;
     let call = Call { order: *order, along: &along, wanted: &wanted };
     let found = function.call(&call, &arrays)?;
     if found.len() != results.len() {
@@ -253,21 +226,15 @@ unsafe fn execute(frame: &CallFrame) -> Result<(), String> {
 
 /// # Safety
 ///
-/// `attributes` must be XLA's.
-unsafe fn attributes(attributes: &Attributes) -> Result<Vec<(&[u8], i64)>, String> {
-    at_least(attributes.struct_size, size_of::<Attributes>())?;
-    let one = |k: usize| {
-        // SAFETY: there are `size` types, names and values; a scalar of 64 bits has an i64 as its value.
-        unsafe {
-            let (name, scalar) = (&**attributes.names.add(k), *attributes.values.add(k));
-            let name = slice::from_raw_parts(name.bytes, name.length);
-            let known = *attributes.types.add(k) == ATTRIBUTE_SCALAR && (*scalar).dtype == S64;
-            known
-                .then(|| (name, (*scalar).value.read_unaligned()))
-                .ok_or_else(|| format!("the attribute {} is no int64", name.escape_ascii()))
-        }
-    };
-    (0..count(attributes.size)?).map(one).collect()
+/// `buffer` must be XLA's.
+unsafe fn settings(buffer: &Buffer) -> Result<[i64; 4], String> {
+    // SAFETY: the caller's.
+    if buffer.dtype != S32 || unsafe { dims(buffer)? } != [8] {
+        return Err("the first argument of a call must be its settings, int32 [8]".to_owned());
+    }
+    let words = numbers::<i32>(buffer, 8)?;
+    // SAFETY: eight numbers of 32 bits are four of 64.
+    Ok(unsafe { words.cast::<[i64; 4]>().read_unaligned() })
 }
 
 /// # Safety

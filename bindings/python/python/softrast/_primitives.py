@@ -57,7 +57,7 @@ def _shapes(order, of, along, wanted, arrays):
 
 def _bits(flags):
     """Flags as a number, the first as the lowest bit."""
-    return np.int64(sum(1 << place for place, flag in enumerate(flags) if flag))
+    return sum(1 << place for place, flag in enumerate(flags) if flag)
 
 
 def _primitive(order):
@@ -76,8 +76,11 @@ def _primitive(order):
             compute(*arrays, of=of)
         # Compiled code knows the function by its number.
         ctx.module_context.add_keepalive(of)
-        settings = dict(function=np.int64(of.id), order=np.int64(_ORDERS.index(order)), along=_bits(along), wanted=_bits(wanted))
-        return jax.ffi.ffi_lowering(_TARGET)(ctx, *arrays, **settings)
+        # An array and no attributes: XLA before JAX 0.7.2 ends the process where it compiles for several threads and a call has some.
+        # Of int32, as int64 may be off.
+        settings = np.array([of.id, _ORDERS.index(order), _bits(along), _bits(wanted)], np.int64).view(np.int32)
+        ctx = ctx.replace(avals_in=[jax.core.ShapedArray(settings.shape, settings.dtype), *ctx.avals_in])
+        return jax.ffi.ffi_lowering(_TARGET)(ctx, mlir.ir_constant(settings), *arrays)
 
     def refuse(ctx, *_, **__):
         raise ValueError(f"{_CPU}, found a function that is compiled for {', '.join(ctx.module_context.platforms)}: use jax.jit on the CPU")
