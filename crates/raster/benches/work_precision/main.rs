@@ -97,6 +97,9 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Both panels of a workload.
+const PASSES: [&str; 2] = ["image", "gradient"];
+
 /// An image and its gradient with respect to the world vertices, flat, and the time of both.
 struct Drawn {
     image: Vec<f64>,
@@ -199,7 +202,7 @@ fn work_precision(workload: &Workload, csv: &mut String) -> [Panel; 2] {
     }
     [("largest error of a pixel", 0), ("relative error of the gradient", 1)].map(|(x, which)| {
         let lines = METHODS.into_iter().zip(series.iter().map(|points| points[which].clone()));
-        Panel::new(name, x, lines)
+        Panel::new(&format!("{name}: {}", PASSES[which]), x, lines)
     })
 }
 
@@ -245,7 +248,7 @@ fn colour_work_precision(workload: &Workload, csv: &mut String) -> [Panel; 2] {
     }
     [("largest error of a pixel", 0), ("relative error of the gradient", 1)].map(|(x, which)| {
         let lines = METHODS.into_iter().zip(series.iter().map(|points| points[which].clone()));
-        Panel::new(&workload.name, x, lines)
+        Panel::new(&format!("{}: {}", workload.name, PASSES[which]), x, lines)
     })
 }
 
