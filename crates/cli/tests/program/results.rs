@@ -207,6 +207,8 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
             2,
             "nothing to choose from",
         ),
+        ("search --no-surrogate --surrogate-scale 2", 2, "cannot be used with"),
+        ("--rate-end 1.1", 2, "above 0 and at most 1"),
         ("search --seed 999999", 2, "seeds 1000000 to 1000007"),
         ("search --softness auto", 2, "--softness auto goes with solve and evaluate"),
         ("learn --softness auto", 2, "--softness auto goes with solve and evaluate"),

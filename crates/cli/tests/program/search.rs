@@ -101,6 +101,19 @@ fn a_task_that_says_nothing_is_searched_around_its_defaults() {
 }
 
 #[test]
+fn ingredients_can_be_left_out_of_a_search() {
+    let line =
+        "search --size 8 --steps 2 --runs 2 --search-runs 1 --loops 20 --no-surrogate --rate-end 1";
+    let (_out, json) = solved::<Disc>(line);
+    let trials = json["search"]["trials"].as_array().unwrap();
+    assert_eq!(trials.len(), 20);
+    for trial in trials {
+        assert!(trial["surrogate_scale"].is_null(), "{trial}");
+        assert_eq!(trial["rate_end"].as_f64(), Some(1.0), "{trial}");
+    }
+}
+
+#[test]
 fn another_command_in_the_folder_keeps_the_search() {
     let (out, _) = solved::<Disc>(KNOWN);
     let before = files(out.path());
