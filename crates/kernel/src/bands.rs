@@ -9,7 +9,7 @@ use super::{
     lanes::{GROUP, LANES, Lanes, Plain, Work, has_vectors, run},
     reach::{Reach, grown, in_pixels, is_seen_clockwise},
     real::splat,
-    tasks::task,
+    tasks::{filled, task},
 };
 use crate::ImageSize;
 
@@ -19,8 +19,10 @@ const MOST_ROWS: usize = 64;
 const FEW_VIEWS: usize = 4;
 /// No band has more rows: a list has eight bits for them.
 const ROWS: usize = 255;
+/// No band but the last has fewer rows: a list takes up to eight rows of a face at once.
+const LEAST_ROWS: usize = 6;
 /// Faces or vertices per rayon task.
-const AT_ONCE: usize = 1 << 14;
+const AT_ONCE: usize = 1 << 11;
 /// Work of a face in each row, in addition to its groups of pixels.
 const ROW_OF_FACE: i64 = 1;
 
@@ -121,7 +123,7 @@ impl Bands {
         let view = |vertices: &[F]| {
             let (x, rest) = vertices.split_at(vertices_per_view);
             let (y, z) = rest.split_at(vertices_per_view);
-            let mut places = vec![[F::ZERO; 2]; vertices_per_view];
+            let mut places = filled([F::ZERO; 2], vertices_per_view);
             places.par_chunks_mut(AT_ONCE).enumerate().for_each(|(chunk, places)| {
                 task("places", || {
                     for (k, place) in (chunk * AT_ONCE..).zip(places) {
@@ -130,7 +132,7 @@ impl Bands {
                 });
             });
             let places = &places;
-            let mut reaches = vec![Reach::NOTHING; faces.len()];
+            let mut reaches = filled(Reach::NOTHING, faces.len());
             let chunks = faces.par_chunks(AT_ONCE).zip(reaches.par_chunks_mut(AT_ONCE));
             let reach = |(faces, reaches)| {
                 task("reach", || {
@@ -259,7 +261,11 @@ fn starts(reaches: &[Reach], count: usize, size: ImageSize) -> Vec<u32> {
         all.iter_mut().zip(some).for_each(|(all, some)| *all += some);
         all
     };
-    let changes = reaches.par_chunks(AT_ONCE).map(changes).reduce_with(add).unwrap_or_default();
+    let changes = reaches
+        .par_chunks(AT_ONCE.max(8 * size.height))
+        .map(changes)
+        .reduce_with(add)
+        .unwrap_or_default();
     let (mut of_row, mut all) = (0, 0);
     // The work of each row and of those above it.
     let until: Vec<i64> = (0..size.height)
@@ -277,8 +283,7 @@ fn starts(reaches: &[Reach], count: usize, size: ImageSize) -> Vec<u32> {
         let done = if last == 0 { 0 } else { until[last - 1] };
         let share = done + (all - done) / (left as i64 + 1);
         let row = until.partition_point(|&until| until <= share);
-        // A list takes one row of a face per lane at once.
-        let row = if row < last + LANES * 3 / 2 { last + LANES } else { row };
+        let row = row.max(last + LEAST_ROWS);
         let most = (last + ROWS).min(size.height - left);
         let least = size.height.saturating_sub(left * ROWS);
         starts.push(row.min(most).max(least).max(last + 1));
@@ -301,7 +306,7 @@ fn by_band(reaches: &[Reach], band_of: &[u32], count: usize) -> (Vec<u32>, Vec<u
         let own = parts.iter().map(|(starts, _)| starts[band + 1] - starts[band]);
         offsets[band + 1] = offsets[band] + own.sum::<u32>();
     }
-    let mut entries = vec![0u32; offsets[count] as usize];
+    let mut entries = filled(0u32, offsets[count] as usize);
     let mut left = &mut entries[..];
     let lists: Vec<_> = offsets
         .windows(2)

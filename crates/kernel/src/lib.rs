@@ -96,7 +96,7 @@ pub use reach::{FAR_AWAY, inside_spans, is_seen_clockwise};
 pub use real::Dual;
 pub use sum::Inputs;
 pub use table::Grid;
-pub use tasks::{recorded_tasks, task};
+pub use tasks::{filled, recorded_tasks, task};
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

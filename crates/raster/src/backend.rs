@@ -1,6 +1,7 @@
 //! Fused ops as a burn backend extension, each with its gradient and its second derivative.
 
-use softrast_kernel::{Kernels as _, PixelLoss};
+use rayon::prelude::*;
+use softrast_kernel::{Kernels as _, PixelLoss, task};
 use softrast_tensor::{
     Autodiff, Backend, DType, Element, FloatTensor, Shape, Slice, Tensor, TensorData,
     TensorMetadata, TensorPrimitive,
@@ -12,6 +13,9 @@ use crate::{
     ProfileSum, SilhouetteLoss,
     ops::{ElementaryOp, FusedOp, Numbers, Pass},
 };
+
+/// Faces per task of a check.
+const FACES: usize = 1 << 14;
 
 fn slice<F: Element>(data: &TensorData) -> &[F] {
     data.as_slice().expect("all tensors of a call have one float type")
@@ -226,7 +230,9 @@ fn check<B: RasterBackend>(op: &ProfileSum, vertices: &Tensor<B, 3>, table: &Ten
     let (found, rows) = (table.dims(), op.grid.rows());
     assert_eq!(found, [rows, 4], "a table of this profile is [{rows}, 4], found {found:?}");
     assert_eq!(vertices.dtype(), table.dtype(), "vertices and table differ in float type");
-    let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
+    let largest = |faces: &[[u32; 3]]| faces.as_flattened().iter().copied().max();
+    let largest = op.faces.par_chunks(FACES).map(|faces| task("check", || largest(faces)));
+    let largest = largest.max().flatten().map_or(0, |v| v as usize + 1);
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
 }
 

@@ -22,7 +22,7 @@ use super::{
     rooms,
     scene::{BandRef, Scene},
     sum::Inputs,
-    tasks::task,
+    tasks::{filled, task},
     walk::{Gradient, Image, Pair, TOGETHER, Visitor, walk},
 };
 use crate::ImageSize;
@@ -89,18 +89,20 @@ fn of_views<L: Lanes>(
     let zero = L::Float::ZERO;
     let (views, pixels) = (bands.views.len(), scene.size.pixels());
     let in_band = |view: usize, band: usize| {
-        let mut room = rooms::taken();
         let place = scene.place(&bands.views[view], view, views, band);
         let (rows, width) = (place.rows(), scene.size.width);
         let judged = judged.part(view, pixels, rows.start * width..rows.end * width);
         let whole = bands.count == 1;
-        let work = Band { scene, place, judged, loss, with_gradient, whole, room: &mut room };
-        let done = task("loss of a band", || run::<L, _>(work));
-        rooms::leave(room);
-        done
+        task("loss of a band", || {
+            let mut room = rooms::taken();
+            let work = Band { scene, place, judged, loss, with_gradient, whole, room: &mut room };
+            let done = run::<L, _>(work);
+            rooms::leave(room);
+            done
+        })
     };
     let count = scene.vertices.len();
-    let mut gradient = vec![zero; count];
+    let mut gradient = filled(zero, count);
     let losses = gradient
         .par_chunks_mut((count / views.max(1)).max(1))
         .enumerate()

@@ -1,6 +1,7 @@
 use std::sync::{Arc, OnceLock};
 
-use softrast_kernel::{Bands, Inputs, Judged, Kernels, PixelLoss, bands_of_losses};
+use rayon::prelude::*;
+use softrast_kernel::{Bands, Inputs, Judged, Kernels, PixelLoss, bands_of_losses, filled, task};
 use softrast_tensor::{Element, TensorData};
 
 use crate::{
@@ -59,11 +60,10 @@ impl SilhouetteLoss {
         let own_gradient = OnceLock::new();
         let gradient = || {
             let kept = self.kept.as_deref().unwrap_or(&own_gradient);
-            let kept = kept.get_or_init(|| {
+            kept.get_or_init(|| {
                 let [_, gradient] = losses(true);
                 flat(gradient)
-            });
-            kept.clone()
+            })
         };
         let of_view = vertices.len() / views.max(1);
         match pass {
@@ -78,12 +78,21 @@ impl SilhouetteLoss {
             Pass::Vjp { wanted } => {
                 let vertices_alone = wanted[0] && !wanted[1..].contains(&true);
                 assert!(vertices_alone, "only the vertices have a gradient");
-                let mut gradient = gradient();
-                let numbers = gradient.as_mut_slice::<F>().expect("numbers of this type");
-                for (view, &factor) in numbers.chunks_mut(of_view.max(1)).zip(rest[0]) {
-                    view.iter_mut().for_each(|number| *number = *number * factor);
-                }
-                gradient
+                let gradient = gradient();
+                let numbers = gradient.as_slice::<F>().expect("numbers of this type");
+                let mut scaled = filled(F::ZERO, numbers.len());
+                let views = numbers.par_chunks(of_view.max(1)).zip(rest[0]);
+                scaled.par_chunks_mut(of_view.max(1)).zip(views).for_each(
+                    |(scaled, (own, &factor))| {
+                        task("scaling", || {
+                            scaled
+                                .iter_mut()
+                                .zip(own)
+                                .for_each(|(to, &number)| *to = number * factor);
+                        });
+                    },
+                );
+                flat(scaled)
             }
             Pass::VjpOfVjp { wanted, .. } => {
                 let (upstream, direction) = (rest[0], rest[1]);

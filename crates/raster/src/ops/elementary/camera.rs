@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Elementary, Views, number::Number};
-use softrast_kernel::{Dual, Float, task};
+use softrast_kernel::{Dual, Float, filled, task};
 
 use crate::{NEAR, limits::FARTHEST};
 
@@ -80,7 +80,9 @@ pub(crate) struct Perspective;
 /// Points per block of the gradient of a matrix: blocks are summed first, then added.
 const BLOCK: usize = 256;
 /// Points per rayon task.
-const POINTS: usize = 64 * BLOCK;
+const POINTS: usize = 8 * BLOCK;
+/// Points per task that adds up the gradients of all views; divides [`POINTS`].
+const TOGETHER: usize = 512;
 
 impl Perspective {
     /// The point of a view and its projection: x, y, depth, and one over the depth used as divisor.
@@ -102,7 +104,7 @@ impl Elementary for Perspective {
 
     fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N> {
         let (points, count) = (Views::new(inputs[0], &dims[0]), dims[0][1]);
-        let mut all = vec![N::of(0.0); 3 * dims[1][0] * count];
+        let mut all = filled(N::of(0.0), 3 * dims[1][0] * count);
         let views = all.par_chunks_mut((3 * count).max(1)).zip(inputs[1].par_chunks_exact(12));
         views.enumerate().for_each(|(view, (out, matrix))| {
             let (xs, rest) = out.split_at_mut(count);
@@ -187,12 +189,24 @@ impl Elementary for Perspective {
         let of_views: Vec<_> = (0..views).into_par_iter().map(of_view).collect();
         let mut gradient = Vec::new();
         if wanted[0] {
-            gradient = vec![zero; inputs[0].len()];
-            for (view, (to_points, _)) in of_views.iter().enumerate() {
-                let chunks = points.of_mut(&mut gradient, view).par_chunks_mut(3 * POINTS);
-                chunks.zip(to_points).for_each(|(totals, parts)| {
-                    totals.iter_mut().zip(parts).for_each(|(total, &part)| *total = *total + part);
+            gradient = filled(zero, inputs[0].len());
+            let add = |totals: &mut [N], of_views: &[(Vec<Vec<N>>, [N; 12])]| {
+                totals.par_chunks_mut(3 * TOGETHER).enumerate().for_each(|(k, totals)| {
+                    let first = k * TOGETHER;
+                    task("projection, back together", || {
+                        for (to_points, _) in of_views {
+                            let parts = &to_points[first / POINTS][3 * (first % POINTS)..];
+                            let numbers = totals.iter_mut().zip(parts);
+                            numbers.for_each(|(total, &part)| *total = *total + part);
+                        }
+                    });
                 });
+            };
+            if points.shared {
+                add(&mut gradient, &of_views);
+            } else {
+                let views = gradient.par_chunks_mut((3 * count).max(1)).zip(&of_views);
+                views.for_each(|(own, of_view)| add(own, std::slice::from_ref(of_view)));
             }
         }
         if wanted[1] {

@@ -103,8 +103,4 @@ impl<'a, N> Views<'a, N> {
     pub(super) fn of(&self, view: usize) -> &'a [N] {
         &self.numbers[self.range(view)]
     }
-
-    pub(super) fn of_mut<'b>(&self, numbers: &'b mut [N], view: usize) -> &'b mut [N] {
-        &mut numbers[self.range(view)]
-    }
 }
