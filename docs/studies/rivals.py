@@ -1,6 +1,6 @@
 """Times a step of softrast or of another rasterizer: image, squared error to a disk, gradient to the world vertices, in float32 (deodr in float64).
 
-    python docs/studies/rivals.py CODE [--spot FILE.obj] [--device cpu|cuda] [--threads N] [--steps N] [--warm-up N]
+    python docs/studies/rivals.py CODE [--spot FILE.obj] [--colour] [--device cpu|cuda] [--threads N] [--steps N] [--warm-up N]
 
 CODE is softrast, pytorch3d, drtk, deodr, gendr, softras, metaras or nvdiffrast. Every code needs torch and the wheel of softrast, which has the scenes.
 W1 is a sphere of 1,280 faces in 24 views of 64 x 64 pixels; W2 is the mesh spot of 5,856 faces (`--spot`) in one view of 256 x 256 pixels.
@@ -9,6 +9,8 @@ The output is one row of a Markdown table for each variant of the code: code and
 
 Soft images of one scene have one mean: softrast, pytorch3d, gendr, softras and metaras with a logistic. deodr, drtk and nvdiffrast show hard edges, which
 deodr and nvdiffrast antialias. Settings of pytorch3d are those of its tutorial `fit_textured_mesh`, those of gendr and metaras of their experiments on shapes.
+
+With `--colour`, which softrast, drtk and deodr have, every vertex has three channels, and the gradient is that to vertices and colours.
 
 softrast, deodr, pytorch3d and drtk have been run by this script, on a CPU; gendr, softras, metaras and nvdiffrast need CUDA and have not been.
 On a CPU pytorch3d takes half a minute for a step: `--steps 1 --warm-up 0`.
@@ -29,6 +31,8 @@ import torch
 DISTANCE, FOV = 2.732, 60.0
 SIGMA = 1e-4
 DISK = (0.1, 0.05, 0.5)
+# A near and a far depth around the meshes.
+PLANES = (1.7, 3.8)
 
 
 @dataclass
@@ -37,6 +41,7 @@ class Scene:
     faces: torch.Tensor  # [F, 3], int64
     azimuths: torch.Tensor  # [views], degrees; at 0 the camera is at -z and +x is on its left
     size: int
+    colours: torch.Tensor | None = None  # [V, 3] in [0, 1]
 
     @property
     def views(self):
@@ -70,7 +75,7 @@ def squared_error(image, target):
 
 
 # A function for each code: from a scene to variants by name, each a function from vertices [V, 3] to the image [views, size, size], and one from
-# image and target to the loss.
+# image and target to the loss. In colour the image is [views, size, size, 3], or [views, 3, size, size] with a loss of its own.
 
 
 def softrast(scene):
@@ -80,6 +85,15 @@ def softrast(scene):
     renderer = softrast.Renderer(scene.faces.numpy(), scene.size, softrast.Softness("logistic", SIGMA, squared=True))
     cameras = torch.from_numpy(softrast.orbit(DISTANCE, 0.0, scene.azimuths.numpy(), FOV)).float()
     seen = lambda vertices: st.project(vertices, cameras)
+    if scene.colours is not None:
+        softness = softrast.Softness("logistic", SIGMA, squared=True)
+
+        def drawing(culls):
+            renderer = softrast.ColourRenderer(scene.faces.numpy(), scene.size, softness, PLANES, cull_back_faces=culls)
+            return lambda vertices: st.blend(renderer, seen(vertices), scene.colours)[:, :3]
+
+        loss = lambda image, target: squared_error(image, target.movedim(-1, 1))
+        return {"all faces": (drawing(False), loss), "front faces": (drawing(True), loss)}
     return {
         "one op": (seen, lambda corners, target: st.silhouette_loss(renderer, corners, target).mean()),
         "two ops": (lambda vertices: st.silhouette(renderer, seen(vertices)), lambda image, target: st.mse_loss(image, target).mean()),
@@ -108,7 +122,11 @@ def drtk(scene):
         corners = in_pixels(vertices, scene)
         index = drtk.rasterize(corners, faces, scene.size, scene.size)
         _, barycentric = drtk.render(corners, faces, index)
-        return drtk.edge_grad_estimator(corners, faces, barycentric, (index != -1).float()[:, None], index)[:, 0]
+        covered = (index != -1).float()[:, None]
+        if scene.colours is not None:
+            covered = covered * drtk.interpolate(scene.colours.expand(scene.views, -1, -1), faces, index, barycentric)
+        image = drtk.edge_grad_estimator(corners, faces, barycentric, covered, index)
+        return image[:, 0] if scene.colours is None else image.movedim(1, -1)
 
     return {"": (image, squared_error)}
 
@@ -121,29 +139,35 @@ def deodr(scene):
     adjacencies = TriMeshAdjacencies(faces)
     nothing = np.zeros(len(faces), dtype=bool)
 
-    def plane(corners):
-        places = np.ascontiguousarray(corners[:, :2])
+    def plane(corners, colours):
+        places, channels = np.ascontiguousarray(corners[:, :2]), colours.shape[1]
         return Scene2D(
             faces=faces, faces_uv=faces, ij=places, depths=np.ascontiguousarray(corners[:, 2]), textured=nothing, shaded=nothing,
-            uv=np.zeros((count, 2)), shade=np.zeros(count), colors=np.ones((count, 1)), edgeflags=adjacencies.edge_on_silhouette(places),
-            height=scene.size, width=scene.size, nb_colors=1, texture=np.zeros((0, 0, 1)),
-            background_image=np.zeros((scene.size, scene.size, 1)), backface_culling=True,
+            uv=np.zeros((count, 2)), shade=np.zeros(count), colors=colours, edgeflags=adjacencies.edge_on_silhouette(places),
+            height=scene.size, width=scene.size, nb_colors=channels, texture=np.zeros((0, 0, channels)),
+            background_image=np.zeros((scene.size, scene.size, channels)), backface_culling=True,
         )
 
     class Render(torch.autograd.Function):
         @staticmethod
-        def forward(ctx, corners):
-            ctx.planes = [plane(view) for view in corners.double().numpy()]
-            return torch.from_numpy(np.stack([each.render()[0][..., 0] for each in ctx.planes])).float()
+        def forward(ctx, corners, colours):
+            ctx.planes = [plane(view, colours.double().numpy()) for view in corners.double().numpy()]
+            return torch.from_numpy(np.stack([each.render()[0] for each in ctx.planes])).float()
 
         @staticmethod
         def backward(ctx, by_image):
             for each, upstream in zip(ctx.planes, by_image.double().numpy()):
-                each.render_backward(np.ascontiguousarray(upstream[..., None]), make_copies=False)
+                each.render_backward(np.ascontiguousarray(upstream), make_copies=False)
             by_places = torch.from_numpy(np.stack([each.ij_b for each in ctx.planes])).float()
-            return torch.nn.functional.pad(by_places, (0, 1))
+            by_colours = torch.from_numpy(sum(each.colors_b for each in ctx.planes)).float()
+            return torch.nn.functional.pad(by_places, (0, 1)), by_colours
 
-    return {"": (lambda vertices: Render.apply(in_pixels(vertices, scene)), squared_error)}
+    def image(vertices):
+        colours = torch.ones(count, 1) if scene.colours is None else scene.colours
+        found = Render.apply(in_pixels(vertices, scene), colours)
+        return found[..., 0] if scene.colours is None else found
+
+    return {"": (image, squared_error)}
 
 
 def mirrored(image, target):
@@ -216,6 +240,9 @@ def nvdiffrast(scene):
     return {"": (image, squared_error)}
 
 
+# Codes with images in colour.
+COLOURED = ["softrast", "drtk", "deodr"]
+
 # The function, the name of the distribution, the devices, and how to install the code.
 CODES = {
     "softrast": (softrast, "softrast", ["cpu"], "maturin build --release --manifest-path bindings/python/Cargo.toml --out wheels && pip install wheels/softrast-*.whl"),
@@ -233,18 +260,23 @@ def measure(draw, loss, scene, steps, warm_up=3):
     """Median ms of a step, and the mean of the image; not a number where the image stays inside an op."""
     vertices = scene.positions.clone().requires_grad_()
     target = disk(scene.size).to(vertices.device).repeat(scene.views, 1, 1)
+    inputs = [vertices]
+    if scene.colours is not None:
+        target = target[..., None].expand(-1, -1, -1, 3)
+        inputs.append(scene.colours)
     times = []
     for _ in range(warm_up + steps):
-        vertices.grad = None
+        for x in inputs:
+            x.grad = None
         start = time.perf_counter()
         image = draw(vertices)
         loss(image, target).backward()
         if vertices.is_cuda:
             torch.cuda.synchronize()
         times.append(1e3 * (time.perf_counter() - start))
-    if not (vertices.grad.isfinite().all() and vertices.grad.abs().sum() > 0):
-        sys.exit("the gradient is not finite or is zero")
-    return statistics.median(times[-steps:]), image.mean().item() if image.shape[-1] == scene.size else math.nan
+    if not all(x.grad.isfinite().all() and x.grad.abs().sum() > 0 for x in inputs):
+        sys.exit("a gradient is not finite or is zero")
+    return statistics.median(times[-steps:]), image.mean().item() if image.shape[1] in (3, scene.size) else math.nan
 
 
 def machine(device, threads):
@@ -259,6 +291,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("code", choices=CODES)
     parser.add_argument("--spot", metavar="FILE.obj", help="the mesh of W2; without it W1 alone is timed")
+    parser.add_argument("--colour", action="store_true", help="an image in three channels")
     parser.add_argument("--device", choices=["cpu", "cuda"], help="default: the one where the code runs, the CPU if both do")
     parser.add_argument("--threads", type=int, default=os.cpu_count())
     parser.add_argument("--steps", type=int, default=100)
@@ -268,6 +301,8 @@ def main():
     device = given.device or devices[0]
     if device not in devices:
         parser.error(f"{given.code} does not run on {device}")
+    if given.colour and given.code not in COLOURED:
+        parser.error(f"{given.code} is not drawn in colour here, but {', '.join(COLOURED)}")
     if given.threads < 1 or given.steps < 1 or given.warm_up < 0:
         parser.error("--threads and --steps start at 1, --warm-up at 0")
     os.environ["RAYON_NUM_THREADS"] = str(given.threads)
@@ -284,6 +319,9 @@ def main():
     results = {}
     for (positions, faces, _), azimuths, size in meshes:
         scene = Scene(torch.from_numpy(positions).float().to(device), torch.from_numpy(faces).long().to(device), azimuths.to(device), size)
+        if given.colour:
+            waves = 0.5 + 0.5 * torch.sin(0.1 * torch.arange(3 * len(positions))).reshape(-1, 3)
+            scene.colours = waves.to(device).requires_grad_()
         try:
             variants = build(scene)
         except ImportError as error:
