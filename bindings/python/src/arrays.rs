@@ -1,15 +1,17 @@
 //! Arrays of either float type, as frameworks hand them in and get them back.
 
 use std::{
+    any::Any,
     borrow::Cow,
     ops::{Add, Mul},
+    sync::Arc,
 };
 
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use softrast_raster::low_level::Numbers;
 
-use crate::guard::refused;
+use crate::{guard::refused, store::Store};
 
 /// An array of a call: C-contiguous, borrowed or owned.
 #[derive(Clone)]
@@ -25,13 +27,21 @@ pub(crate) struct Array<'a> {
 pub(crate) enum Floats<'a> {
     F32(Cow<'a, [f32]>),
     F64(Cow<'a, [f64]>),
+    /// Those of a tensor on a device, see [`crate::device::On`].
+    Device(Arc<dyn Any + Send + Sync>),
 }
 
-/// An array whose float type is known.
-#[derive(Clone)]
-pub(crate) struct View<'a, F> {
+/// An array of which it is known where its numbers lie and of what type they are.
+pub(crate) struct View<'a, S: Store> {
     pub(crate) dims: Vec<usize>,
-    pub(crate) values: &'a [F],
+    pub(crate) values: &'a S::Slice,
+}
+
+// Derived, it would ask for numbers that can be cloned.
+impl<S: Store> Clone for View<'_, S> {
+    fn clone(&self) -> Self {
+        Self { dims: self.dims.clone(), values: self.values }
+    }
 }
 
 /// float32 or float64.
@@ -67,16 +77,6 @@ macro_rules! float {
 float!(f32, F32);
 float!(f64, F64);
 
-/// Numbers in float64.
-pub(crate) fn wide<F: Float>(values: &[F]) -> Vec<f64> {
-    values.iter().map(|x| x.elem()).collect()
-}
-
-/// Numbers rounded to a type.
-pub(crate) fn narrow<F: Float>(values: &[f64]) -> Vec<F> {
-    values.iter().map(|x| F::from_elem(*x)).collect()
-}
-
 /// Whether two slices have the same bits.
 pub(crate) fn same<F: Float>(a: &[F], b: &[F]) -> bool {
     let differ = |a: &[F], b: &[F]| {
@@ -95,6 +95,7 @@ impl Floats<'_> {
         match self {
             Self::F32(values) => f32::any(&values[range]),
             Self::F64(values) => f64::any(&values[range]),
+            Self::Device(_) => unreachable!("arrays on a device have no axes in front"),
         }
     }
 
@@ -108,25 +109,26 @@ impl Floats<'_> {
     }
 
     /// These numbers in float64.
-    pub(crate) fn wide(&self) -> Vec<f64> {
+    pub(crate) fn wide(&self) -> Result<Vec<f64>, String> {
         match self {
-            Self::F32(values) => wide(values),
-            Self::F64(values) => values.to_vec(),
+            Self::F32(values) => Ok(f32::wide(values)),
+            Self::F64(values) => Ok(values.to_vec()),
+            Self::Device(_) => Err("φ must lie on the CPU".to_owned()),
         }
     }
 
     /// Numbers rounded to the type of these.
     pub(crate) fn like(&self, values: Vec<f64>) -> Floats<'static> {
         match self {
-            Self::F32(_) => f32::any(narrow::<f32>(&values)),
-            Self::F64(_) => f64::any(values),
+            Self::F32(own) => f32::any(f32::narrow(&values, own)),
+            Self::F64(_) | Self::Device(_) => f64::any(values),
         }
     }
 }
 
 impl<'a> Array<'a> {
-    pub(crate) fn view<F: Float>(&'a self) -> Result<View<'a, F>, String> {
-        let values = F::of(&self.numbers).ok_or(MIXED)?;
+    pub(crate) fn view<S: Store>(&'a self) -> Result<View<'a, S>, String> {
+        let values = S::known(&self.numbers).ok_or(MIXED)?;
         Ok(View { dims: self.dims.clone(), values })
     }
 
@@ -176,6 +178,7 @@ impl Array<'_> {
             Floats::F64(values) => {
                 PyArray1::from_vec(py, values.into_owned()).reshape(self.dims)?.into_any()
             }
+            Floats::Device(_) => unreachable!("results of arrays of the host"),
         })
     }
 }

@@ -6,12 +6,17 @@ use std::{
     sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak},
 };
 
-use pyo3::prelude::*;
+use pyo3::{prelude::*, types::PyCapsule};
+#[cfg(feature = "cuda")]
+use softrast_raster::Cuda;
 use softrast_raster::low_level::ElementaryOp;
+use softrast_tensor::NdArray;
 
 use crate::{
     arrays::{Array, Borrowed, Floats},
-    guard::refused,
+    device,
+    dlpack::{self, Lent},
+    guard::{refused, unwound},
     kind::{Call, Kind, Order, misfit},
     losses::Losses,
     op::Op,
@@ -141,14 +146,43 @@ impl Function {
         along: Vec<bool>,
         wanted: Vec<bool>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        let named = Order::ALL.into_iter().find(|(name, _)| *name == order);
-        let (_, order) = named.ok_or_else(|| refused(format!("there is no derivative {order}")))?;
+        let order = Order::named(order)?;
         let arrays: Vec<_> = arrays.iter().map(Borrowed::new).collect::<PyResult<_>>()?;
         let arrays: Vec<_> = arrays.iter().map(Borrowed::array).collect::<PyResult<_>>()?;
         let call = Call { order, along: &along, wanted: &wanted };
         let found = py.detach(|| self.0.call(&call, &arrays)).map_err(refused)?;
         found.into_iter().map(|array| array.into_numpy(py)).collect()
     }
+
+    /// Writes the results of a derivative to `outputs`, for arrays on one device that are given as unused capsules of DLPack. All are float32, but for
+    /// φ and its gradient, which are float64 on the CPU. There are no further axes in front.
+    fn call_dlpack<'py>(
+        &self,
+        py: Python<'py>,
+        order: &str,
+        inputs: Vec<Bound<'py, PyCapsule>>,
+        outputs: Vec<Bound<'py, PyCapsule>>,
+        along: Vec<bool>,
+        wanted: Vec<bool>,
+    ) -> PyResult<()> {
+        let call = Call { order: Order::named(order)?, along: &along, wanted: &wanted };
+        let inputs: Vec<_> = inputs.iter().map(Lent::new).collect::<PyResult<_>>()?;
+        let outputs: Vec<_> = outputs.iter().map(Lent::new).collect::<PyResult<_>>()?;
+        let work = match inputs.first().map(|first| first.device[0]) {
+            Some(dlpack::CPU) => device::call::<NdArray<f32>>,
+            #[cfg(feature = "cuda")]
+            Some(dlpack::CUDA) => device::call::<Cuda>,
+            _ => return Err(refused("softrast does not draw on the device of the arrays")),
+        };
+        let kind = &self.0.kind;
+        py.detach(|| unwound(|| work(kind, &call, &inputs, &outputs)).flatten()).map_err(refused)
+    }
+}
+
+/// Whether this wheel was built with the feature cuda.
+#[pyfunction]
+pub(crate) fn has_cuda() -> bool {
+    cfg!(feature = "cuda")
 }
 
 impl Known {
@@ -174,6 +208,7 @@ impl Known {
         let one = |arrays: &[Array<'_>]| match first.numbers {
             Floats::F32(_) => self.kind.call::<f32>(call, arrays),
             Floats::F64(_) => self.kind.call::<f64>(call, arrays),
+            Floats::Device(_) => Err(wrong()),
         };
         if own == 0 {
             return one(arrays);

@@ -23,11 +23,15 @@ pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) 
 
 /// Works on threads that this process has; a panic becomes its message.
 pub(crate) fn caught<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, String> {
-    let work = || catch_unwind(AssertUnwindSafe(work)).map_err(|panic| message(&*panic));
     match own_threads()? {
-        None => work(),
-        Some(threads) => threads.install(work),
+        None => unwound(work),
+        Some(threads) => threads.install(|| unwound(work)),
     }
+}
+
+/// Works on this thread; a panic becomes its message.
+pub(crate) fn unwound<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| message(&*panic))
 }
 
 /// To be called as the library is loaded.

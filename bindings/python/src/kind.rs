@@ -1,12 +1,16 @@
 //! Kinds of functions, and their results for one scene.
 
-use std::sync::Arc;
+use std::{borrow::Borrow, sync::Arc};
+
+use pyo3::PyResult;
 
 use crate::{
-    arrays::{Array, Float, View},
+    arrays::{Array, View},
+    guard::refused,
     losses::Losses,
     op::Op,
-    passes::{Blends, Directions, Found, Inputs, Silhouettes},
+    passes::{Blends, Directions, Found, Inputs, MISSING, Silhouettes},
+    store::Store,
 };
 
 /// Which derivative of a function.
@@ -25,6 +29,12 @@ pub(crate) enum Order {
 }
 
 impl Order {
+    /// The order of a name.
+    pub(crate) fn named(name: &str) -> PyResult<Self> {
+        let found = Self::ALL.into_iter().find(|(known, _)| *known == name);
+        Ok(found.ok_or_else(|| refused(format!("there is no derivative {name}")))?.1)
+    }
+
     /// The orders by their names.
     pub(crate) const ALL: [(&str, Self); 5] = [
         ("value", Self::Value),
@@ -112,7 +122,7 @@ impl Kind {
     }
 
     /// The results for one scene.
-    pub(crate) fn call<F: Float>(
+    pub(crate) fn call<S: Store>(
         &self,
         call: &Call<'_>,
         arrays: &[Array<'_>],
@@ -137,15 +147,17 @@ impl Kind {
         let (inputs, rest) = arrays.split_at(count);
         let (kept, rest) = rest.split_at(kept);
         let (upstream, mut rest) = rest.split_at(upstream);
-        let (place, empty) = (self.phi(), View { dims: Vec::new(), values: &[] });
-        let mut given = Inputs { views: Vec::new(), phi: Vec::new() };
+        let place = self.phi();
+        let mut given: Inputs<'_, S> = Inputs { views: Vec::new(), phi: Vec::new() };
         for (k, array) in inputs.iter().enumerate() {
             if Some(k) == place {
-                given.phi = array.numbers.wide();
+                given.phi = array.numbers.wide()?;
+                given.views.push(given.views[0].clone());
+            } else {
+                given.views.push(array.view()?);
             }
-            given.views.push(if Some(k) == place { empty.clone() } else { array.view()? });
         }
-        let mut directions = Directions { views: vec![None; count], phi: None };
+        let mut directions = Directions { views: inputs.iter().map(|_| None).collect(), phi: None };
         for k in (0..count).filter(|&k| call.along.get(k) == Some(&true)) {
             let Some((direction, others)) = rest.split_first() else { return Err(wrong()) };
             rest = others;
@@ -153,16 +165,16 @@ impl Kind {
                 return Err(wrong());
             }
             if Some(k) == place {
-                directions.phi = Some(direction.numbers.wide());
+                directions.phi = Some(direction.numbers.wide()?);
             } else {
-                directions.views[k] = Some(direction.view()?.values);
+                directions.views[k] = Some(direction.view::<S>()?.values);
             }
         }
         let mut wanted = call.wanted.to_vec();
         if let Self::Silhouette(of, true) = self {
             // Its own φ stays as it is.
             given.phi = of.renderer.phi().to_vec();
-            given.views.push(empty);
+            given.views.push(given.views[0].clone());
             directions.views.push(None);
             wanted.insert(wanted.len().min(1), false);
         }
@@ -176,23 +188,23 @@ impl Kind {
                 self.vjp_of_vjp(&given, kept.as_ref(), upstream, directions, &wanted)?
             }
             (Order::Jvp, _) => {
-                let zeros = vec![F::from_elem(0.0); dims.iter().product()];
-                let upstream = View { dims: dims.clone(), values: &zeros };
+                let zeros = S::filled(0.0, dims.iter().product(), given.views[0].values);
+                let upstream = View { dims: dims.clone(), values: zeros.borrow() };
                 let mut wanted = vec![false; given.views.len()];
                 wanted.push(true);
                 let found =
                     self.vjp_of_vjp(&given, kept.as_ref(), &upstream, directions, &wanted)?;
-                let moved = found.views.into_iter().last().flatten().unwrap_or_default();
-                return Ok(vec![Array { dims, numbers: F::any(moved) }]);
+                let moved = found.views.into_iter().last().flatten().ok_or(MISSING)?;
+                return Ok(vec![Array { dims, numbers: S::floats(moved) }]);
             }
             _ => {
                 let mut values = self.forward(&given, order == Order::Value)?;
                 values.truncate(if order == Order::Image { 1 } else { values.len() });
                 // Sums have the shape of the value, gradients of losses that of the vertices.
                 let kept = if let Self::Loss(_) = self { &given.views[0].dims } else { &dims };
-                let array = |(values, dims): (Vec<F>, &Vec<usize>)| Array {
+                let array = |(values, dims): (S::Owned, &Vec<usize>)| Array {
                     dims: dims.clone(),
-                    numbers: F::any(values),
+                    numbers: S::floats(values),
                 };
                 return Ok(values.into_iter().zip([&dims, kept]).map(array).collect());
             }
@@ -206,16 +218,16 @@ impl Kind {
             let numbers = if Some(k) == place {
                 found.phi.take().map(|phi| array.numbers.like(phi))
             } else {
-                found.views[if k == count { last } else { k }].take().map(F::any)
+                found.views[if k == count { last } else { k }].take().map(S::floats)
             };
-            let numbers = numbers.ok_or("a gradient is missing")?;
+            let numbers = numbers.ok_or(MISSING)?;
             gradients.push(Array { dims: array.dims.clone(), numbers });
         }
         Ok(gradients)
     }
 
     /// The shape of the value.
-    fn dims<F: Float>(&self, views: &[View<'_, F>]) -> Result<Vec<usize>, String> {
+    fn dims<S: Store>(&self, views: &[View<'_, S>]) -> Result<Vec<usize>, String> {
         match self {
             Self::Op(op, ..) => {
                 op.shape(&views.iter().map(|view| view.dims.clone()).collect::<Vec<_>>())
@@ -226,11 +238,11 @@ impl Kind {
         }
     }
 
-    fn forward<F: Float>(
+    fn forward<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
+        inputs: &Inputs<'_, S>,
         keeps: bool,
-    ) -> Result<Vec<Vec<F>>, String> {
+    ) -> Result<Vec<S::Owned>, String> {
         match self {
             Self::Op(op, ..) => Ok(vec![op.forward(&inputs.views)?]),
             Self::Silhouette(of, _) => of.forward(inputs, keeps),
@@ -239,13 +251,13 @@ impl Kind {
         }
     }
 
-    fn vjp<F: Float>(
+    fn vjp<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
-        kept: Option<&View<'_, F>>,
-        upstream: &View<'_, F>,
+        inputs: &Inputs<'_, S>,
+        kept: Option<&View<'_, S>>,
+        upstream: &View<'_, S>,
         wanted: &[bool],
-    ) -> Result<Found<F>, String> {
+    ) -> Result<Found<S>, String> {
         match (self, kept) {
             (Self::Silhouette(of, _), Some(kept)) => of.vjp(inputs, kept, upstream, wanted),
             (Self::Loss(of), Some(kept)) => {
@@ -259,14 +271,14 @@ impl Kind {
         }
     }
 
-    fn vjp_of_vjp<F: Float>(
+    fn vjp_of_vjp<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
-        kept: Option<&View<'_, F>>,
-        upstream: &View<'_, F>,
-        directions: Directions<'_, F>,
+        inputs: &Inputs<'_, S>,
+        kept: Option<&View<'_, S>>,
+        upstream: &View<'_, S>,
+        directions: Directions<'_, S>,
         wanted: &[bool],
-    ) -> Result<Found<F>, String> {
+    ) -> Result<Found<S>, String> {
         match (self, kept) {
             (Self::Silhouette(of, _), Some(kept)) => {
                 of.vjp_of_vjp(inputs, kept, upstream, directions, wanted)

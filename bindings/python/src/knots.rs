@@ -6,9 +6,10 @@ use std::{
 };
 
 use crate::{
-    arrays::{Array, Float, View, narrow, same},
+    arrays::{Array, View, same},
     guard::caught,
     op::Op,
+    store::Store,
     taped::Taped,
 };
 
@@ -41,9 +42,9 @@ impl Drawing {
         Ok(Self { knots, phi: phi.to_vec(), table })
     }
 
-    /// The table `[rows, 4]`.
-    pub(crate) fn table<F: Float>(&self) -> Vec<F> {
-        narrow(&self.table)
+    /// The table `[rows, 4]`, in the place of other numbers.
+    pub(crate) fn table<S: Store>(&self, beside: &S::Slice) -> S::Owned {
+        S::narrow(&self.table, beside)
     }
 
     /// The gradient to φ of that to the table.
@@ -114,11 +115,14 @@ struct Call {
 }
 
 impl Recent {
-    /// The op of the call of `of` with these inputs: an earlier one, or a new one.
-    pub(crate) fn op<F: Float>(&self, of: &Op, inputs: &[View<'_, F>]) -> Op {
-        let known = |(input, known): (&View<'_, F>, &Array<'_>)| {
-            let values = F::of(&known.numbers);
-            input.dims == known.dims && values.is_some_and(|values| same(values, input.values))
+    /// The op of the call of `of` with these inputs: an earlier one, or a new one. On a device nothing is kept: reading the numbers takes longer.
+    pub(crate) fn op<S: Store>(&self, of: &Op, inputs: &[View<'_, S>]) -> Op {
+        if !S::ON_HOST {
+            return of.clone();
+        }
+        let known = |(input, known): (&View<'_, S>, &Array<'_>)| {
+            let values = S::known(&known.numbers);
+            input.dims == known.dims && values.is_some_and(|values| S::same(values, input.values))
         };
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let found = |call: &&Call| call.of.is(of) && inputs.iter().zip(&call.inputs).all(known);
@@ -127,9 +131,9 @@ impl Recent {
         }
         let op = of.keeping();
         // Copies: callers may write to their arrays.
-        let copy = |view: &View<'_, F>| Array {
+        let copy = |view: &View<'_, S>| Array {
             dims: view.dims.clone(),
-            numbers: F::any(view.values.to_vec()),
+            numbers: S::floats(view.values.to_owned()),
         };
         let call = Call { of: of.clone(), inputs: inputs.iter().map(copy).collect(), op };
         let op = call.op.clone();

@@ -7,6 +7,10 @@
 mod arrays;
 mod checks;
 mod colour;
+#[cfg(feature = "cuda")]
+mod cuda;
+mod device;
+mod dlpack;
 mod function;
 mod guard;
 mod kind;
@@ -20,6 +24,7 @@ mod pose;
 mod renderer;
 mod shape;
 mod softness;
+mod store;
 mod taped;
 mod views;
 mod watched;
@@ -35,7 +40,7 @@ mod _native {
     #[pymodule_export]
     use crate::{
         colour::ColourRenderer,
-        function::{Function, iou_loss, mse_loss, orbit_matrix, perspective},
+        function::{Function, has_cuda, iou_loss, mse_loss, orbit_matrix, perspective},
         guard::threads,
         learn::learn_softness,
         meshes::{fox, icosphere, load_mesh, save_mesh},

@@ -1,6 +1,9 @@
 //! Losses of silhouettes against targets, each with its gradient to the vertices from one walk over the faces.
 
-use std::sync::{Arc, OnceLock};
+use std::{
+    borrow::Borrow,
+    sync::{Arc, OnceLock},
+};
 
 use softrast_raster::{
     HostBackend, TConorm,
@@ -8,11 +11,12 @@ use softrast_raster::{
 };
 
 use crate::{
-    arrays::{Float, View},
+    arrays::View,
     guard::caught,
     knots::{Drawing, Knots},
     op::{Gradients, Op},
-    passes::{Directions, Inputs, Silhouettes, Tabled, sum},
+    passes::{Directions, Inputs, MISSING, Silhouettes, Tabled, only},
+    store::Store,
     taped::Taped,
 };
 
@@ -34,7 +38,7 @@ impl Losses {
     }
 
     /// The op of the loss, with a table of the renderer's φ; if it `keeps`, it computes the gradient too.
-    fn tabled<F: Float>(&self, keeps: bool) -> Result<Tabled<'_, F>, String> {
+    fn tabled<S: Store>(&self, keeps: bool, beside: &S::Slice) -> Result<Tabled<'_, S>, String> {
         let drawing = match self.drawing.get() {
             Some(drawing) => drawing,
             None => {
@@ -49,51 +53,68 @@ impl Losses {
             }
         };
         let op = &drawing.knots.op;
-        Ok(Tabled::new(if keeps { op.keeping() } else { op.clone() }, 1, drawing))
+        Ok(Tabled::new(if keeps { op.keeping() } else { op.clone() }, 1, drawing, beside))
     }
 
     /// The losses and, if it `keeps`, their gradients.
-    pub(crate) fn forward<F: Float>(
+    pub(crate) fn forward<S: Store>(
         &self,
-        views: &[View<'_, F>],
+        views: &[View<'_, S>],
         keeps: bool,
-    ) -> Result<Vec<Vec<F>>, String> {
-        let of = self.tabled(keeps)?;
+    ) -> Result<Vec<S::Owned>, String> {
+        if !S::ON_HOST {
+            return self.composed(views, keeps);
+        }
+        let of = self.tabled::<S>(keeps, views[0].values)?;
         let scene = of.scene(&[views[0].clone(), views[0].clone(), views[1].clone()]);
         if !keeps {
             return Ok(vec![of.op.forward(&scene)?]);
         }
-        let ones = vec![F::from_elem(1.0); views[0].dims[0]];
-        let ones = View { dims: vec![ones.len()], values: &ones };
+        let ones = ones(views);
+        let ones = View { dims: vec![views[0].dims[0]], values: ones.borrow() };
         let losses = of.op.forward(&scene)?;
-        let found = of.op.vjp(&scene, &ones, &[true, false, false])?;
-        Ok(vec![losses, found.into_iter().flatten().next().unwrap_or_default()])
+        Ok(vec![losses, only::<S>(of.op.vjp(&scene, &ones, &[true, false, false])?)?])
+    }
+
+    /// As `forward`, of an op for the image and one for its loss.
+    fn composed<S: Store>(
+        &self,
+        views: &[View<'_, S>],
+        keeps: bool,
+    ) -> Result<Vec<S::Owned>, String> {
+        let (image, sums) = self.image(views)?;
+        let pair = self.pair(views, &image);
+        let mut found = vec![self.of_images.forward(&pair)?];
+        if keeps {
+            let ones = ones(views);
+            let ones = View { dims: vec![views[0].dims[0]], values: ones.borrow() };
+            let by_image = only::<S>(self.of_images.vjp(&pair, &ones, &[true, false])?)?;
+            let by_image = View { dims: pair[0].dims.clone(), values: by_image.borrow() };
+            let sums = View { dims: pair[0].dims.clone(), values: sums.borrow() };
+            let gradients =
+                self.scene.vjp(&self.inputs(views), &sums, &by_image, &[true, false])?;
+            found.push(only::<S>(gradients.views)?);
+        }
+        Ok(found)
     }
 
     /// The shape of the value, if the inputs fit.
-    pub(crate) fn dims<F>(&self, views: &[View<'_, F>]) -> Result<Vec<usize>, String> {
+    pub(crate) fn dims<S: Store>(&self, views: &[View<'_, S>]) -> Result<Vec<usize>, String> {
         let image = self.scene.dims(&views[0]);
         self.of_images.shape(&[image, views[1].dims.clone()])
     }
 
-    pub(crate) fn vjp<F: Float>(
+    pub(crate) fn vjp<S: Store>(
         &self,
-        views: &[View<'_, F>],
-        kept: &View<'_, F>,
-        upstream: &View<'_, F>,
+        views: &[View<'_, S>],
+        kept: &View<'_, S>,
+        upstream: &View<'_, S>,
         wanted: &[bool],
-    ) -> Result<Gradients<F>, String> {
+    ) -> Result<Gradients<S>, String> {
         if upstream.dims != self.dims(views)? || kept.dims != views[0].dims {
             return Err("a loss and its gradients are of other views".to_owned());
         }
-        let of_view = kept.values.len() / upstream.values.len().max(1);
-        let to_vertices = wanted[0].then(|| {
-            let mut all = kept.values.to_vec();
-            for (part, factor) in all.chunks_mut(of_view.max(1)).zip(upstream.values) {
-                part.iter_mut().for_each(|x| *x = *x * *factor);
-            }
-            all
-        });
+        let to_vertices = wanted[0].then(|| S::scaled(kept.values, upstream.values));
         if !wanted[1] {
             return Ok(vec![to_vertices, None]);
         }
@@ -104,40 +125,39 @@ impl Losses {
     }
 
     /// By the chain rule over the image and its loss: the second derivative of the image, and that of the loss along its motion.
-    pub(crate) fn vjp_of_vjp<F: Float>(
+    pub(crate) fn vjp_of_vjp<S: Store>(
         &self,
-        views: &[View<'_, F>],
-        upstream: &View<'_, F>,
-        directions: &[Option<&[F]>],
+        views: &[View<'_, S>],
+        upstream: &View<'_, S>,
+        directions: &[Option<&S::Slice>],
         wanted: &[bool],
-    ) -> Result<Gradients<F>, String> {
+    ) -> Result<Gradients<S>, String> {
         let (image, sums) = self.image(views)?;
         let pair = self.pair(views, &image);
         let inputs = self.inputs(views);
-        let sums = View { dims: pair[0].dims.clone(), values: &sums };
+        let sums = View { dims: pair[0].dims.clone(), values: sums.borrow() };
         let (moved, curved);
         let mut along = [None, directions[1]];
         if directions[0].is_some() {
-            let by_image = self.of_images.vjp(&pair, upstream, &[true, false])?;
-            let by_image = by_image.into_iter().flatten().next().unwrap_or_default();
-            let by_image = View { dims: pair[0].dims.clone(), values: &by_image };
+            let by_image = only::<S>(self.of_images.vjp(&pair, upstream, &[true, false])?)?;
+            let by_image = View { dims: pair[0].dims.clone(), values: by_image.borrow() };
             let motion = Directions { views: vec![directions[0], None], phi: None };
             let flags = [wanted[0], false, true];
             let mut found = self.scene.vjp_of_vjp(&inputs, &sums, &by_image, motion, &flags)?;
-            moved = found.views.pop().flatten().unwrap_or_default();
+            moved = found.views.pop().flatten().ok_or(MISSING)?;
             curved = found.views.into_iter().next().flatten();
-            along[0] = Some(&moved[..]);
+            along[0] = Some(moved.borrow());
         } else {
             curved = None;
         }
         let flags = [wanted[0], wanted[1], wanted[2]];
         let mut found = self.of_images.vjp_of_vjp(&pair, upstream, &along, &flags)?;
         let to_vertices = found[0].take().map(|bent| {
-            let bent = View { dims: pair[0].dims.clone(), values: &bent };
+            let bent = View { dims: pair[0].dims.clone(), values: bent.borrow() };
             let found = self.scene.vjp(&inputs, &sums, &bent, &[true, false])?;
-            let bent = found.views.into_iter().next().flatten().unwrap_or_default();
+            let bent = only::<S>(found.views)?;
             Ok::<_, String>(match curved {
-                Some(curved) => sum(bent, &curved),
+                Some(curved) => S::sum(bent, curved.borrow()),
                 None => bent,
             })
         });
@@ -146,20 +166,27 @@ impl Losses {
     }
 
     /// The image and its sums.
-    fn image<F: Float>(&self, views: &[View<'_, F>]) -> Result<(Vec<F>, Vec<F>), String> {
+    fn image<S: Store>(&self, views: &[View<'_, S>]) -> Result<(S::Owned, S::Owned), String> {
         let found = self.scene.forward(&self.inputs(views), true)?;
         let [image, sums] = found.try_into().map_err(|_| "an image is missing")?;
         Ok((image, sums))
     }
 
     /// Inputs of the loss of images.
-    fn pair<'a, F: Float>(&self, views: &[View<'a, F>], image: &'a [F]) -> [View<'a, F>; 2] {
-        [View { dims: self.scene.dims(&views[0]), values: image }, views[1].clone()]
+    fn pair<'a, S: Store>(&self, views: &[View<'a, S>], image: &'a S::Owned) -> [View<'a, S>; 2] {
+        [View { dims: self.scene.dims(&views[0]), values: image.borrow() }, views[1].clone()]
     }
 
     /// Inputs of the scene.
-    fn inputs<'a, F: Float>(&self, views: &[View<'a, F>]) -> Inputs<'a, F> {
-        let none = View { dims: Vec::new(), values: &[] };
-        Inputs { views: vec![views[0].clone(), none], phi: self.scene.renderer.phi().to_vec() }
+    fn inputs<'a, S: Store>(&self, views: &[View<'a, S>]) -> Inputs<'a, S> {
+        Inputs {
+            views: vec![views[0].clone(), views[0].clone()],
+            phi: self.scene.renderer.phi().to_vec(),
+        }
     }
+}
+
+/// A factor of 1 for each view.
+fn ones<S: Store>(views: &[View<'_, S>]) -> S::Owned {
+    S::filled(1.0, views[0].dims[0], views[0].values)
 }

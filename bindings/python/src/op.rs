@@ -7,13 +7,8 @@ use softrast_raster::{
     low_level::{ElementaryOp, FusedOp, Pass, Silhouette},
 };
 use softrast_softness::EdgeSoftness;
-use softrast_tensor::{Shape, TensorData};
 
-use crate::{
-    arrays::{Float, View, wide},
-    guard::caught,
-    taped::Taped,
-};
+use crate::{arrays::View, guard::caught, store::Store, taped::Taped};
 
 /// A differentiable function of arrays of one float type.
 #[derive(Clone)]
@@ -52,7 +47,7 @@ struct Blend {
 }
 
 /// Gradients to the arrays that they are wanted for.
-pub(crate) type Gradients<F> = Vec<Option<Vec<F>>>;
+pub(crate) type Gradients<S> = Vec<Option<<S as Store>::Owned>>;
 
 impl Op {
     pub(crate) fn sum(
@@ -115,74 +110,70 @@ impl Op {
     }
 
     /// The value.
-    pub(crate) fn forward<F: Float>(&self, inputs: &[View<'_, F>]) -> Result<Vec<F>, String> {
-        self.run(&Pass::Forward, inputs, &[])
+    pub(crate) fn forward<S: Store>(&self, inputs: &[View<'_, S>]) -> Result<S::Owned, String> {
+        self.run::<S>(&Pass::Forward, inputs, &[])
     }
 
     /// The gradients of `Σ upstream · value` to the inputs that are wanted.
-    pub(crate) fn vjp<F: Float>(
+    pub(crate) fn vjp<S: Store>(
         &self,
-        inputs: &[View<'_, F>],
-        upstream: &View<'_, F>,
+        inputs: &[View<'_, S>],
+        upstream: &View<'_, S>,
         wanted: &[bool],
-    ) -> Result<Gradients<F>, String> {
+    ) -> Result<Gradients<S>, String> {
         let every = [inputs, std::slice::from_ref(upstream)].concat();
         let found = self.run(&Pass::Vjp { wanted: wanted.to_vec() }, &every, &[])?;
-        Ok(spread(found, inputs, wanted))
+        Ok(spread::<S>(found, inputs, wanted))
     }
 
     /// The gradients of `Σ direction · vjp` to the inputs and the upstream, as they are wanted.
-    pub(crate) fn vjp_of_vjp<F: Float>(
+    pub(crate) fn vjp_of_vjp<S: Store>(
         &self,
-        inputs: &[View<'_, F>],
-        upstream: &View<'_, F>,
-        directions: &[Option<&[F]>],
+        inputs: &[View<'_, S>],
+        upstream: &View<'_, S>,
+        directions: &[Option<&S::Slice>],
         wanted: &[bool],
-    ) -> Result<Gradients<F>, String> {
+    ) -> Result<Gradients<S>, String> {
         let every = [inputs, std::slice::from_ref(upstream)].concat();
         let along: Vec<_> = directions.iter().map(Option::is_some).collect();
         if !along.contains(&true) {
-            let still = |(view, &wanted): (&View<'_, F>, &bool)| {
-                wanted.then(|| vec![F::from_elem(0.0); view.values.len()])
+            let still = |(view, &wanted): (&View<'_, S>, &bool)| {
+                wanted.then(|| S::filled(0.0, S::count(view.values), view.values))
             };
             return Ok(every.iter().zip(wanted).map(still).collect());
         }
         let given: Vec<_> = directions.iter().copied().flatten().collect();
         let pass = Pass::VjpOfVjp { along, wanted: wanted.to_vec() };
         let found = self.run(&pass, &every, &given)?;
-        Ok(spread(found, &every, wanted))
+        Ok(spread::<S>(found, &every, wanted))
     }
 
-    fn run<F: Float>(
+    fn run<S: Store>(
         &self,
         pass: &Pass,
-        views: &[View<'_, F>],
-        directions: &[&[F]],
-    ) -> Result<Vec<F>, String> {
+        views: &[View<'_, S>],
+        directions: &[&S::Slice],
+    ) -> Result<S::Owned, String> {
         let dims: Vec<_> = views.iter().map(|view| view.dims.clone()).collect();
-        let lengths: Vec<_> = directions.iter().map(|direction| direction.len()).collect();
+        let lengths: Vec<_> = directions.iter().map(|direction| S::count(direction)).collect();
         self.0.check(pass, &dims, &lengths)?;
         let mut slices: Vec<_> = views.iter().map(|view| view.values).collect();
-        let joined = match *directions {
-            [one] => Cow::Borrowed(one),
-            _ => directions.concat().into(),
+        let joined: Option<Cow<'_, S::Slice>> = match *directions {
+            [] => None,
+            [one] => Some(Cow::Borrowed(one)),
+            _ => Some(Cow::Owned(S::joined(directions))),
         };
-        if !directions.is_empty() {
-            slices.push(&joined);
-        }
-        let data = caught(|| self.0.run(pass, &slices, &dims))?;
-        data.into_vec().map_err(|error| format!("{error:?}"))
+        slices.extend(joined.as_deref());
+        caught(|| self.0.run::<S>(pass, &slices, &dims))
     }
 }
 
 /// The parts of gradients one after the other.
-fn spread<F: Float>(flat: Vec<F>, views: &[View<'_, F>], wanted: &[bool]) -> Gradients<F> {
-    let mut rest = flat;
-    let mut next = |view: &View<'_, F>| {
-        let behind = rest.split_off(view.values.len());
-        std::mem::replace(&mut rest, behind)
-    };
-    views.iter().zip(wanted).map(|(view, &wanted)| wanted.then(|| next(view))).collect()
+fn spread<S: Store>(flat: S::Owned, views: &[View<'_, S>], wanted: &[bool]) -> Gradients<S> {
+    let chosen = views.iter().zip(wanted).filter(|&(_, &wanted)| wanted);
+    let counts: Vec<_> = chosen.map(|(view, _)| S::count(view.values)).collect();
+    let mut parts = S::split(flat, &counts).into_iter();
+    wanted.iter().take(views.len()).map(|&wanted| wanted.then(|| parts.next()).flatten()).collect()
 }
 
 fn misfit(dims: &[Vec<usize>]) -> String {
@@ -268,12 +259,12 @@ impl Kind {
         if fits { Ok(()) } else { Err(misfit(dims)) }
     }
 
-    fn run<F: Float>(&self, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData {
+    fn run<S: Store>(&self, pass: &Pass, inputs: &[&S::Slice], dims: &[Vec<usize>]) -> S::Owned {
         match self {
-            Self::Sum(of) | Self::Loss(of) => F::run_pass(&of.op, pass, slices, dims),
-            Self::Blend(blend) => F::run_pass(&blend.op, pass, slices, dims),
-            Self::Elementary(op) => F::run_pass(&FusedOp::Elementary(*op), pass, slices, dims),
-            Self::AnyCoverage(of) => taped(of, pass, slices),
+            Self::Sum(of) | Self::Loss(of) => S::run(&of.op, pass, inputs, dims),
+            Self::Blend(blend) => S::run(&blend.op, pass, inputs, dims),
+            Self::Elementary(op) => S::run(&FusedOp::Elementary(*op), pass, inputs, dims),
+            Self::AnyCoverage(of) => S::run_taped(of, pass, inputs),
         }
     }
 }
@@ -309,26 +300,4 @@ impl Blend {
             && vertices[2] >= self.least_vertices
             && tables == &[self.rows, 4]
     }
-}
-
-/// A pass of a function that is computed in f64, whatever type its arrays have.
-fn taped<F: Float>(of: &Taped, pass: &Pass, slices: &[&[F]]) -> TensorData {
-    let wide: Vec<_> = slices.iter().map(|slice| wide(slice)).collect();
-    let values = match pass {
-        Pass::Forward => of.forward(&wide[0]),
-        Pass::Vjp { wanted } => {
-            if wanted[0] {
-                of.vjp(&wide[0], &wide[1])
-            } else {
-                Vec::new()
-            }
-        }
-        Pass::VjpOfVjp { wanted, .. } => {
-            let [to_x, to_upstream] = of.vjp_of_vjp(&wide[0], &wide[1], &wide[2]);
-            let parts = [to_x, to_upstream].into_iter().zip(wanted);
-            parts.filter(|&(_, &wanted)| wanted).flat_map(|(part, _)| part).collect()
-        }
-    };
-    let shape = Shape::from([values.len()]);
-    TensorData::new(values, shape).convert::<F>()
 }

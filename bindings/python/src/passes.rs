@@ -1,105 +1,114 @@
 //! Silhouettes and colours as functions of φ: their values and derivatives, composed of ops whose tables follow φ.
 
-use std::sync::Arc;
+use std::{borrow::Borrow, sync::Arc};
 
 use softrast_raster::{ColourRenderer, HostBackend, SoftRenderer, TConorm};
 use softrast_softness::{EdgeSoftness, Softness as _};
 
 use crate::{
-    arrays::{Float, View, narrow, wide},
+    arrays::View,
     checks::{check_phi, least},
     guard::caught,
     knots::{Drawing, Drawings, Knots, Recent},
     op::{Gradients, Op},
+    store::Store,
     taped::Taped,
 };
 
-/// Inputs of a function. φ, if there is one, is in float64, and an empty view has its place.
-pub(crate) struct Inputs<'a, F> {
-    pub(crate) views: Vec<View<'a, F>>,
+/// Inputs of a function. φ, if there is one, is in float64, and some view has its place.
+pub(crate) struct Inputs<'a, S: Store> {
+    pub(crate) views: Vec<View<'a, S>>,
     pub(crate) phi: Vec<f64>,
 }
 
 /// Directions of the inputs, those of φ apart.
-pub(crate) struct Directions<'a, F> {
-    pub(crate) views: Vec<Option<&'a [F]>>,
+pub(crate) struct Directions<'a, S: Store> {
+    pub(crate) views: Vec<Option<&'a S::Slice>>,
     pub(crate) phi: Option<Vec<f64>>,
 }
 
 /// Gradients to the inputs and maybe the upstream as they are wanted, that to φ apart.
-pub(crate) struct Found<F> {
-    pub(crate) views: Gradients<F>,
+pub(crate) struct Found<S: Store> {
+    pub(crate) views: Gradients<S>,
     pub(crate) phi: Option<Vec<f64>>,
 }
 
 /// An op of which one input, at `place`, is a table of φ: as a function that has φ there.
-pub(crate) struct Tabled<'a, F> {
+pub(crate) struct Tabled<'a, S: Store> {
     pub(crate) op: Op,
     place: usize,
     drawing: &'a Drawing,
-    table: Vec<F>,
+    table: S::Owned,
 }
 
-impl<'a, F: Float> Tabled<'a, F> {
-    pub(crate) fn new(op: Op, place: usize, drawing: &'a Drawing) -> Self {
-        Self { op, place, drawing, table: drawing.table() }
+impl<'a, S: Store> Tabled<'a, S> {
+    /// The table lies where the numbers `beside` do.
+    pub(crate) fn new(op: Op, place: usize, drawing: &'a Drawing, beside: &S::Slice) -> Self {
+        Self { op, place, drawing, table: drawing.table::<S>(beside) }
     }
 
     /// The inputs with the table in its place.
-    pub(crate) fn scene<'b>(&'b self, views: &[View<'b, F>]) -> Vec<View<'b, F>> {
+    pub(crate) fn scene<'b>(&'b self, views: &[View<'b, S>]) -> Vec<View<'b, S>> {
         let mut views = views.to_vec();
-        views[self.place] = View { dims: vec![self.drawing.knots.rows, 4], values: &self.table };
+        views[self.place] =
+            View { dims: vec![self.drawing.knots.rows, 4], values: self.table.borrow() };
         views
     }
 
     fn vjp(
         &self,
-        views: &[View<'_, F>],
-        upstream: &View<'_, F>,
+        views: &[View<'_, S>],
+        upstream: &View<'_, S>,
         wanted: &[bool],
-    ) -> Result<Found<F>, String> {
+    ) -> Result<Found<S>, String> {
         if !wanted.contains(&true) {
-            return Ok(Found { views: vec![None; wanted.len()], phi: None });
+            return Ok(Found { views: wanted.iter().map(|_| None).collect(), phi: None });
         }
         let mut views = self.op.vjp(&self.scene(views), upstream, wanted)?;
         let to_table = views[self.place].take();
-        let phi = to_table.map(|to_table| self.drawing.to_phi(&wide(&to_table))).transpose()?;
+        let phi = to_table
+            .map(|to_table| self.drawing.to_phi(&S::wide(to_table.borrow())))
+            .transpose()?;
         Ok(Found { views, phi })
     }
 
     fn vjp_of_vjp(
         &self,
-        views: &[View<'_, F>],
-        upstream: &View<'_, F>,
-        directions: &Directions<'_, F>,
+        views: &[View<'_, S>],
+        upstream: &View<'_, S>,
+        directions: &Directions<'_, S>,
         wanted: &[bool],
-    ) -> Result<Found<F>, String> {
+    ) -> Result<Found<S>, String> {
         let (scene, place) = (self.scene(views), self.place);
         let (mut along, mut bent) = (directions.views.clone(), None);
         let by_table;
         if let Some(direction) = &directions.phi {
             let only: Vec<_> = (0..scene.len()).map(|k| k == place).collect();
-            let to_table = self.op.vjp(&scene, upstream, &only)?[place].take().unwrap_or_default();
+            let to_table = self.op.vjp(&scene, upstream, &only)?[place].take().ok_or(MISSING)?;
+            let to_table = S::wide(to_table.borrow());
             let Drawing { knots, phi, .. } = self.drawing;
-            let [to_phi, moved] =
-                caught(|| knots.tables.vjp_of_vjp(phi, &wide(&to_table), direction))?;
+            let [to_phi, moved] = caught(|| knots.tables.vjp_of_vjp(phi, &to_table, direction))?;
             bent = Some(to_phi);
-            by_table = narrow::<F>(&moved);
-            along[place] = Some(&by_table);
+            by_table = S::narrow(&moved, upstream.values);
+            along[place] = Some(by_table.borrow());
         }
         let mut views = self.op.vjp_of_vjp(&scene, upstream, &along, wanted)?;
         let to_phi = views[place].take();
-        let to_phi = to_phi.map(|to_table| self.drawing.to_phi(&wide(&to_table))).transpose()?;
+        let to_phi =
+            to_phi.map(|to_table| self.drawing.to_phi(&S::wide(to_table.borrow()))).transpose()?;
         let phi = to_phi.map(|to_phi| match bent {
-            Some(bent) => sum(to_phi, &bent),
+            Some(bent) => f64::sum(to_phi, &bent),
             None => to_phi,
         });
         Ok(Found { views, phi })
     }
 }
 
-pub(crate) fn sum<F: Float>(a: Vec<F>, b: &[F]) -> Vec<F> {
-    a.into_iter().zip(b).map(|(a, b)| a + *b).collect()
+pub(crate) const MISSING: &str = "a gradient is missing";
+
+/// The only gradient of some.
+pub(crate) fn only<S: Store>(found: Gradients<S>) -> Result<S::Owned, String> {
+    Ok(found.into_iter().flatten().next().ok_or(MISSING)?)
 }
 
 /// Vertices `[views, 3, V]` and maybe φ `[P]` to coverage `[views, height, width]`; kept are the sums.
@@ -145,42 +154,42 @@ impl Silhouettes {
     }
 
     /// The image, and the sums; if it `keeps`, the passes back find what is known about the vertices.
-    pub(crate) fn forward<F: Float>(
+    pub(crate) fn forward<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
+        inputs: &Inputs<'_, S>,
         keeps: bool,
-    ) -> Result<Vec<Vec<F>>, String> {
+    ) -> Result<Vec<S::Owned>, String> {
         let drawing = self.drawing(&inputs.phi)?;
         let op = &drawing.knots.op;
         let op = if keeps { self.recent.op(op, &inputs.views[..1]) } else { op.clone() };
-        let of = Tabled::new(op, 1, &drawing);
+        let of = Tabled::<S>::new(op, 1, &drawing, inputs.views[0].values);
         let sums = of.op.forward(&of.scene(&inputs.views))?;
         let dims = self.dims(&inputs.views[0]);
-        Ok(vec![self.coverage.forward(&[View { dims, values: &sums }])?, sums])
+        Ok(vec![self.coverage.forward::<S>(&[View { dims, values: sums.borrow() }])?, sums])
     }
 
     /// The shape of the image.
-    pub(crate) fn dims<F>(&self, vertices: &View<'_, F>) -> Vec<usize> {
+    pub(crate) fn dims<S: Store>(&self, vertices: &View<'_, S>) -> Vec<usize> {
         vec![vertices.dims[0], self.size[0], self.size[1]]
     }
 
     /// Sums as they are differentiated, of a scene with these vertices.
-    fn sums<'a, F: Float>(&'a self, drawing: &'a Drawing, views: &[View<'_, F>]) -> Tabled<'a, F> {
+    fn sums<'a, S: Store>(&'a self, drawing: &'a Drawing, views: &[View<'_, S>]) -> Tabled<'a, S> {
         let felt = self.surrogate.as_ref().unwrap_or(drawing);
-        Tabled::new(self.recent.op(&felt.knots.op, &views[..1]), 1, felt)
+        Tabled::new(self.recent.op(&felt.knots.op, &views[..1]), 1, felt, views[0].values)
     }
 
-    pub(crate) fn vjp<F: Float>(
+    pub(crate) fn vjp<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
-        kept: &View<'_, F>,
-        upstream: &View<'_, F>,
+        inputs: &Inputs<'_, S>,
+        kept: &View<'_, S>,
+        upstream: &View<'_, S>,
         wanted: &[bool],
-    ) -> Result<Found<F>, String> {
+    ) -> Result<Found<S>, String> {
         let drawing = self.drawing(&inputs.phi)?;
         let sums = self.sums(&drawing, &inputs.views);
         let to_sums = self.to_sums(kept, upstream)?;
-        let to_sums = View { dims: kept.dims.clone(), values: &to_sums };
+        let to_sums = View { dims: kept.dims.clone(), values: to_sums.borrow() };
         let found = sums.vjp(&inputs.views, &to_sums, &self.learned(wanted))?;
         Ok(self.found(inputs, found, wanted))
     }
@@ -190,45 +199,45 @@ impl Silhouettes {
         [flags[0], flags[1] && self.surrogate.is_none()]
     }
 
-    fn to_sums<F: Float>(
+    fn to_sums<S: Store>(
         &self,
-        kept: &View<'_, F>,
-        upstream: &View<'_, F>,
-    ) -> Result<Vec<F>, String> {
-        let found = self.coverage.vjp(std::slice::from_ref(kept), upstream, &[true])?;
-        Ok(found.into_iter().flatten().next().unwrap_or_default())
+        kept: &View<'_, S>,
+        upstream: &View<'_, S>,
+    ) -> Result<S::Owned, String> {
+        only::<S>(self.coverage.vjp(std::slice::from_ref(kept), upstream, &[true])?)
     }
 
-    pub(crate) fn vjp_of_vjp<F: Float>(
+    pub(crate) fn vjp_of_vjp<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
-        kept: &View<'_, F>,
-        upstream: &View<'_, F>,
-        mut directions: Directions<'_, F>,
+        inputs: &Inputs<'_, S>,
+        kept: &View<'_, S>,
+        upstream: &View<'_, S>,
+        mut directions: Directions<'_, S>,
         wanted: &[bool],
-    ) -> Result<Found<F>, String> {
+    ) -> Result<Found<S>, String> {
         let drawing = self.drawing(&inputs.phi)?;
         let sums = self.sums(&drawing, &inputs.views);
         let to_sums = self.to_sums(kept, upstream)?;
-        let to_sums = View { dims: kept.dims.clone(), values: &to_sums };
+        let to_sums = View { dims: kept.dims.clone(), values: to_sums.borrow() };
         if self.surrogate.is_some() {
             directions.phi = None;
         }
         let wants = self.learned(wanted);
         let every = [wants[0], wants[1], true];
         let mut first = sums.vjp_of_vjp(&inputs.views, &to_sums, &directions, &every)?;
-        let moved = first.views.pop().flatten().unwrap_or_default();
+        let moved = first.views.pop().flatten().ok_or(MISSING)?;
         // The gradient changes with the image as well: by how the sums become coverage.
         let one = std::slice::from_ref(kept);
-        let mut of = self.coverage.vjp_of_vjp(one, upstream, &[Some(&moved)], &[true, true])?;
+        let mut of =
+            self.coverage.vjp_of_vjp(one, upstream, &[Some(moved.borrow())], &[true, true])?;
         let to_upstream = of.pop().flatten();
         if wants.contains(&true) {
-            let by_sums = of.pop().flatten().unwrap_or_default();
-            let by_sums = View { dims: kept.dims.clone(), values: &by_sums };
+            let by_sums = of.pop().flatten().ok_or(MISSING)?;
+            let by_sums = View { dims: kept.dims.clone(), values: by_sums.borrow() };
             let again = sums.vjp(&inputs.views, &by_sums, &wants)?;
             let pairs = first.views.into_iter().zip(again.views);
-            first.views = pairs.map(|(a, b)| Some(sum(a?, &b?))).collect();
-            first.phi = first.phi.zip(again.phi).map(|(a, b)| sum(a, &b));
+            first.views = pairs.map(|(a, b)| Some(S::sum(a?, b?.borrow()))).collect();
+            first.phi = first.phi.zip(again.phi).map(|(a, b)| f64::sum(a, &b));
         }
         let mut found = self.found(inputs, first, wanted);
         found.views.push(to_upstream.filter(|_| wanted[2]));
@@ -236,7 +245,12 @@ impl Silhouettes {
     }
 
     /// Gradients with 0 for a φ that has none.
-    fn found<F>(&self, inputs: &Inputs<'_, F>, mut found: Found<F>, wanted: &[bool]) -> Found<F> {
+    fn found<S: Store>(
+        &self,
+        inputs: &Inputs<'_, S>,
+        mut found: Found<S>,
+        wanted: &[bool],
+    ) -> Found<S> {
         if wanted[1] && found.phi.is_none() {
             found.phi = Some(vec![0.0; inputs.phi.len()]);
         }
@@ -292,8 +306,8 @@ impl Blends {
         self.texture.is_some()
     }
 
-    fn drawing<F: Float>(&self, inputs: &Inputs<'_, F>) -> Result<Arc<Drawing>, String> {
-        let log_weight = inputs.views[3].values.last().map_or(f64::NAN, |&weight| weight.elem());
+    fn drawing<S: Store>(&self, inputs: &Inputs<'_, S>) -> Result<Arc<Drawing>, String> {
+        let log_weight = S::wide(inputs.views[3].values).last().copied().unwrap_or(f64::NAN);
         self.drawings.drawing(&inputs.phi, &[log_weight], || {
             let weighting = self.renderer.weighting();
             let split = weighting.edge.parameters().min(inputs.phi.len());
@@ -314,56 +328,59 @@ impl Blends {
     }
 
     /// The op as a function of φ.
-    fn of<'a, F: Float>(&self, drawing: &'a Drawing, inputs: &Inputs<'_, F>) -> Tabled<'a, F> {
-        let mut of = Tabled::new(drawing.knots.op.clone(), Self::PHI, drawing);
+    fn of<'a, S: Store>(&self, drawing: &'a Drawing, inputs: &Inputs<'_, S>) -> Tabled<'a, S> {
+        let beside = inputs.views[0].values;
+        let mut of = Tabled::new(drawing.knots.op.clone(), Self::PHI, drawing, beside);
         let op = self.recent.op(&of.op, &of.scene(&inputs.views));
         of.op = op;
         of
     }
 
     /// The shape of the image.
-    pub(crate) fn dims<F>(&self, views: &[View<'_, F>]) -> Vec<usize> {
+    pub(crate) fn dims<S: Store>(&self, views: &[View<'_, S>]) -> Vec<usize> {
         vec![views[0].dims[0], views[3].dims[0], self.size[0], self.size[1]]
     }
 
-    pub(crate) fn forward<F: Float>(
+    pub(crate) fn forward<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
+        inputs: &Inputs<'_, S>,
         keeps: bool,
-    ) -> Result<Vec<Vec<F>>, String> {
+    ) -> Result<Vec<S::Owned>, String> {
         let views = &inputs.views;
-        let colour = views[3].values.split_last().map_or(&[][..], |(_, colour)| colour);
-        let texture = views.get(4).map_or(&[][..], |texture| texture.values);
-        let named = [(views[1].values, "attributes"), (colour, "background"), (texture, "texture")];
-        for (values, name) in named {
-            if !values.iter().all(|x| x.elem::<f64>().is_finite()) {
+        let behind = S::wide(views[3].values);
+        let colour = behind.split_last().is_none_or(|(_, colour)| f64::finite(colour));
+        let texture = views.get(4).is_none_or(|texture| S::finite(texture.values));
+        let shown = S::finite(views[1].values);
+        for (finite, name) in [(shown, "attributes"), (colour, "background"), (texture, "texture")]
+        {
+            if !finite {
                 return Err(format!("{name} must be finite, found a number that is not"));
             }
         }
         let drawing = self.drawing(inputs)?;
         let of = match keeps {
             true => self.of(&drawing, inputs),
-            false => Tabled::new(drawing.knots.op.clone(), Self::PHI, &drawing),
+            false => Tabled::new(drawing.knots.op.clone(), Self::PHI, &drawing, views[0].values),
         };
         Ok(vec![of.op.forward(&of.scene(views))?])
     }
 
-    pub(crate) fn vjp<F: Float>(
+    pub(crate) fn vjp<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
-        upstream: &View<'_, F>,
+        inputs: &Inputs<'_, S>,
+        upstream: &View<'_, S>,
         wanted: &[bool],
-    ) -> Result<Found<F>, String> {
+    ) -> Result<Found<S>, String> {
         self.of(&*self.drawing(inputs)?, inputs).vjp(&inputs.views, upstream, wanted)
     }
 
-    pub(crate) fn vjp_of_vjp<F: Float>(
+    pub(crate) fn vjp_of_vjp<S: Store>(
         &self,
-        inputs: &Inputs<'_, F>,
-        upstream: &View<'_, F>,
-        directions: &Directions<'_, F>,
+        inputs: &Inputs<'_, S>,
+        upstream: &View<'_, S>,
+        directions: &Directions<'_, S>,
         wanted: &[bool],
-    ) -> Result<Found<F>, String> {
+    ) -> Result<Found<S>, String> {
         let drawing = self.drawing(inputs)?;
         self.of(&drawing, inputs).vjp_of_vjp(&inputs.views, upstream, directions, wanted)
     }

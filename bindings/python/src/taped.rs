@@ -2,14 +2,10 @@
 
 use softrast_raster::{
     TConorm,
-    low_level::{Silhouette, WeightTables},
+    low_level::{Pass, Silhouette, WeightTables},
 };
 use softrast_softness::EdgeSoftness;
 use softrast_tensor::{Autodiff, Backend, DType, NdArray, Tensor, TensorData};
-
-type Plain = NdArray<f64>;
-type Once = Autodiff<Plain>;
-type Twice = Autodiff<Once>;
 
 /// Which function.
 #[derive(Clone, Debug)]
@@ -35,14 +31,12 @@ impl Taped {
 
     /// The values.
     pub(crate) fn forward(&self, x: &[f64]) -> Vec<f64> {
-        numbers(self.of(vector::<Plain>(x)))
+        numbers(self.of(vector(x)))
     }
 
     /// The gradient of `Σ upstream · f(x)`.
     pub(crate) fn vjp(&self, x: &[f64], upstream: &[f64]) -> Vec<f64> {
-        let x = vector::<Once>(x).require_grad();
-        let gradients = (self.of(x.clone()) * vector(upstream)).sum().backward();
-        numbers(x.grad(&gradients).unwrap_or_else(|| x.inner().zeros_like()))
+        numbers(self.gradient(vector(x), vector(upstream)))
     }
 
     /// The gradients of `Σ direction · vjp` to x and to the upstream.
@@ -52,24 +46,53 @@ impl Taped {
         upstream: &[f64],
         direction: &[f64],
     ) -> [Vec<f64>; 2] {
-        let [outer, weights] = [x, upstream].map(|numbers| vector::<Once>(numbers).require_grad());
-        let inner = Tensor::<Twice, 1>::from_inner(outer.clone()).require_grad();
-        let sum = (self.of(inner.clone()) * Tensor::from_inner(weights.clone())).sum();
-        let nothing = || [x, upstream].map(|numbers| vec![0.0; numbers.len()]);
-        let Some(gradient) = inner.grad(&sum.backward()) else { return nothing() };
-        let gradients = (gradient * vector(direction)).sum().backward();
-        [outer, weights]
-            .map(|leaf| numbers(leaf.grad(&gradients).unwrap_or_else(|| leaf.inner().zeros_like())))
+        self.change([x, upstream, direction].map(vector)).map(numbers)
+    }
+
+    /// A pass over tensors of any backend: x, the upstream and the direction, as far as it has them.
+    pub(crate) fn run<B: Backend>(&self, pass: &Pass, inputs: Vec<Tensor<B, 1>>) -> Tensor<B, 1> {
+        let mut inputs = inputs.into_iter();
+        let mut next = || inputs.next().expect("all inputs of the pass");
+        match pass {
+            Pass::Forward => self.of(next()),
+            Pass::Vjp { .. } => self.gradient(next(), next()),
+            Pass::VjpOfVjp { wanted, .. } => {
+                let parts = self.change([next(), next(), next()]).into_iter().zip(wanted);
+                let chosen = parts.filter(|&(_, &wanted)| wanted);
+                Tensor::cat(chosen.map(|(part, _)| part).collect(), 0)
+            }
+        }
+    }
+
+    fn gradient<B: Backend>(&self, x: Tensor<B, 1>, upstream: Tensor<B, 1>) -> Tensor<B, 1> {
+        let x = Tensor::<Autodiff<B>, 1>::from_inner(x).require_grad();
+        let gradients = (self.of(x.clone()) * Tensor::from_inner(upstream)).sum().backward();
+        x.grad(&gradients).unwrap_or_else(|| x.inner().zeros_like())
+    }
+
+    fn change<B: Backend>(&self, given: [Tensor<B, 1>; 3]) -> [Tensor<B, 1>; 2] {
+        let [x, upstream, direction] = given.map(Tensor::<Autodiff<B>, 1>::from_inner);
+        let leaves = [x, upstream].map(Tensor::require_grad);
+        let inner =
+            Tensor::<Autodiff<Autodiff<B>>, 1>::from_inner(leaves[0].clone()).require_grad();
+        let sum = (self.of(inner.clone()) * Tensor::from_inner(leaves[1].clone())).sum();
+        let Some(gradient) = inner.grad(&sum.backward()) else {
+            return leaves.map(|leaf| leaf.inner().zeros_like());
+        };
+        let gradients = (gradient * direction).sum().backward();
+        leaves.map(|leaf| leaf.grad(&gradients).unwrap_or_else(|| leaf.inner().zeros_like()))
     }
 }
 
-fn vector<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
+/// A vector in float64.
+pub(crate) fn vector(values: &[f64]) -> Tensor<NdArray<f64>, 1> {
     let data = TensorData::new(values.to_vec(), [values.len()]);
     // Whatever float type the device has by default.
     Tensor::from_data(data, (&Default::default(), DType::F64))
 }
 
-fn numbers(tensor: Tensor<Plain, 1>) -> Vec<f64> {
+/// The numbers of such a vector.
+pub(crate) fn numbers(tensor: Tensor<NdArray<f64>, 1>) -> Vec<f64> {
     tensor.into_data().iter().collect()
 }
 

@@ -218,6 +218,7 @@ unsafe fn execute(frame: &CallFrame) -> Result<(), String> {
             match &found.numbers {
                 Floats::F32(values) => write(values, &found.dims, buffer, F32)?,
                 Floats::F64(values) => write(values, &found.dims, buffer, F64)?,
+                Floats::Device(_) => unreachable!("results of arrays of the host"),
             }
         }
     }

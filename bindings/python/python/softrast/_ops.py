@@ -89,9 +89,26 @@ def _apart(of, tensors):
 
 
 def _computed(order, name, tensors, along, wanted):
-    """The results of an op, computed on the host."""
+    """The results of an op, computed where its tensors lie."""
+    if tensors[0].is_cuda:
+        return _on_device(order, name, tensors, along, wanted)
     arrays = [tensor.detach().contiguous().numpy() for tensor in tensors]
     return [torch.from_numpy(part) for part in _passes.function(name).call(order[1:] or "value", arrays, list(along), list(wanted))]
+
+
+def _on_device(order, name, tensors, along, wanted):
+    """The results of an op whose tensors are float32 on one device; φ, if there is one, is float64 on the CPU."""
+    found = _fake(order, tensors, name, along, _flags(wanted))
+    with torch.cuda.device_of(tensors[0]):
+        inputs, outputs = ([_lent(tensor) for tensor in of] for of in (tensors, found))
+        _passes.function(name).call_dlpack(order[1:] or "value", inputs, outputs, list(along), list(wanted))
+    return found
+
+
+def _lent(tensor):
+    """A capsule of DLPack. What runs on the current stream of CUDA then comes before what runs on the legacy default stream, 1."""
+    tensor = tensor.detach().contiguous()
+    return tensor.__dlpack__(stream=1) if tensor.is_cuda else tensor.__dlpack__()
 
 
 # The derivatives of the ops, by other ops: `call(order, name, tensors, along, wanted)`.
@@ -301,7 +318,7 @@ def _fake(order, tensors, function, along, wanted):
     """Empty tensors of the shapes of an op's results."""
     of = _passes.function(function)
     inputs, _, rest = _apart(of, tensors)
-    if order in ("", "_jvp"):
+    if order in ("", "_image", "_jvp"):
         shapes = of.shapes(*(tensor.shape for tensor in inputs))
         return [inputs[0].new_empty(shape) for shape in (shapes if order == "" else shapes[:1])]
     return [tensor.new_empty(tensor.shape) for tensor, want in zip([*inputs, *rest[:1]], _which(wanted)) if want]
@@ -337,7 +354,8 @@ def _register(kind, order):
     name = kind + order
     _LIBRARY.define(name + _SCHEMA)
     compute = lambda tensors, function, along, wanted: _computed(order, function, tensors, _which(along), _which(wanted))
-    _LIBRARY.impl(name, compute, "CPU")
+    for device in ("CPU", "CUDA"):
+        _LIBRARY.impl(name, compute, device)
     full = f"softrast::{name}"
     torch.library.register_fake(full, functools.partial(_fake, order), lib=_LIBRARY)
     torch.library.register_autograd(full, _back_of(order), setup_context=_setup, lib=_LIBRARY)

@@ -2,7 +2,7 @@
 
 A function has `count` inputs, and `axes`, how many each has; `views` states that all inputs have the views first and may be concatenated;
 `keeps` is the number of arrays that the value leaves to the derivatives. `shapes(*inputs)` are those of the value and of what is kept.
-`call(order, arrays, along, wanted)` computes it or a derivative, see `_native.Function`.
+`call(order, arrays, along, wanted)` and `call_dlpack` compute it or a derivative, see `_native.Function`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ class Function:
 
     def __init__(self, kind, native, shapes):
         self.handle, self.shapes = f"{kind}-{next(_numbers)}", shapes
-        self.id, self.axes, self.keeps, self.views, self.call = native.id, native.axes, native.keeps, native.views, native.call
+        self.id, self.axes, self.keeps, self.views = native.id, native.axes, native.keeps, native.views
+        self.call, self.call_dlpack = native.call, native.call_dlpack
         self.count = len(self.axes)
         _NAMED[self.handle] = self
 

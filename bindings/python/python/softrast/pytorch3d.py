@@ -35,7 +35,7 @@ def cameras(
     R, T = _st._floats(R, "R"), _st._floats(T, "T")
     if R.dim() != 3 or R.shape[1:] != (3, 3) or T.shape != (R.shape[0], 3) or R.shape[0] == 0:
         raise ValueError(f"R must be [N, 3, 3] and T [N, 3], found {list(R.shape)} and {list(T.shape)}")
-    along = _torch.cat([R.transpose(1, 2), T.to(R.dtype)[..., None]], 2)
+    along = _torch.cat([R.transpose(1, 2), T.to(R)[..., None]], 2)
     focal, middle = (_pair(x, name, along) for x, name in [(focal_length, "focal_length"), (principal_point, "principal_point")])
     left, up, ahead = along.unbind(1)
     # Their x goes left, ours right.
@@ -45,7 +45,7 @@ def cameras(
 
 def _pair(x, name, like):
     """`[N, 2]` of a number, `[N]` or `[N, 2]`."""
-    x = _torch.as_tensor(x, dtype=like.dtype)
+    x = _torch.as_tensor(x, dtype=like.dtype, device=like.device)
     x = x[:, None] if x.dim() == 1 and len(x) in (1, len(like)) else x
     if x.dim() not in (0, 2) or x.dim() == 2 and (x.shape[0] not in (1, len(like)) or x.shape[1] not in (1, 2)):
         raise ValueError(f"{name} must be a number, [{len(like)}] or [{len(like)}, 2], found {list(x.shape)}")

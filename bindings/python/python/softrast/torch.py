@@ -1,13 +1,18 @@
-"""The functions of `softrast` for PyTorch, differentiable twice, on the CPU.
+"""The functions of `softrast` for PyTorch, differentiable twice, on the CPU, and on request on CUDA devices.
 
 Gradients reach vertices, cameras, attributes, background, texture and φ, in reverse and in forward mode: `torch.autograd`, `torch.func.grad`,
 `vmap`, `jacrev`, `jacfwd`, `jvp` and `hessian` work, and `torch.compile(fullgraph=True)` with first derivatives. A third derivative raises an
 error. Arguments, shapes and units are those of `softrast`, with tensors in the place of arrays; float16 and bfloat16 are converted to float32,
 and so are the results.
+
+A tensor on a CUDA device raises an error, unless the wheel was built with the feature `cuda` and the environment variable `SOFTRAST_CUDA` is 1
+at the import. Then float32 vertices are drawn on their device, to which the other arguments are moved; only φ is read on the CPU. **CUDA has
+not been run on a card yet.**
 """
 
 from __future__ import annotations
 
+import os as _os
 from typing import Any as _Any, List as _List, Optional as _Optional, Sequence as _Sequence, Tuple as _Tuple, Union as _Union
 
 import torch as _torch
@@ -25,17 +30,19 @@ _Number = _Union[float, _torch.Tensor]
 
 # As near as the rasterizer draws, in world units.
 _NEAR = 0.01
+# Until it has been seen to work, CUDA is only for those who ask for it.
+_ON_CUDA = _os.environ.get("SOFTRAST_CUDA") == "1" and _softrast._native.has_cuda()
 _HALVES = (_torch.float16, _torch.bfloat16)
 # Plain strings, which torch.compile reads.
 _ORBIT_MATRIX, _PERSPECTIVE = _passes.ORBIT_MATRIX.handle, _passes.PERSPECTIVE.handle
 _LOSSES = {"mse": ("mse_loss", _passes.MSE_LOSS.handle), "iou": ("iou_loss", _passes.IOU_LOSS.handle)}
 
 
-def _floats(x: _torch.Tensor, name: str) -> _torch.Tensor:
-    """A tensor of float32 or float64 on the CPU."""
+def _floats(x: _torch.Tensor, name: str, cuda: bool = _ON_CUDA) -> _torch.Tensor:
+    """A tensor of float32 or float64, on the CPU or where CUDA is allowed."""
     if not isinstance(x, _torch.Tensor):
         raise ValueError(f"{name} must be a tensor, found {type(x).__name__}: convert it with torch.as_tensor")
-    if x.device.type != "cpu":
+    if x.device.type != "cpu" and not (cuda and x.device.type == "cuda"):
         raise ValueError(f"{name} must lie on the CPU, found {x.device}: move it with cpu()")
     if x.dtype in _HALVES:
         return x.float()
@@ -50,9 +57,10 @@ def orbit(distance: _Number, elevation_deg: _Number = 0.0, azimuth_deg: _Number 
     Numbers, or tensors `[]` or `[views]`, of which the result has the float type; float64 if all are numbers. See `softrast.orbit`.
     """
     numbers = [distance, elevation_deg, azimuth_deg, fov_deg]
-    types = [x.dtype for x in numbers if isinstance(x, _torch.Tensor) and x.is_floating_point()]
+    given = [x for x in numbers if isinstance(x, _torch.Tensor)]
+    types, device = [x.dtype for x in given if x.is_floating_point()], given[0].device if given else None
     dtype = _torch.float64 if not types or _torch.float64 in types else types[0]
-    tensors = _torch.broadcast_tensors(*(_torch.atleast_1d(_torch.as_tensor(x, dtype=dtype)) for x in numbers))
+    tensors = _torch.broadcast_tensors(*(_torch.atleast_1d(_torch.as_tensor(x, dtype=dtype, device=device)) for x in numbers))
     return _torch.stack(tensors, -1)
 
 
@@ -61,7 +69,7 @@ def pinhole(
 ) -> _torch.Tensor:
     """Cameras `[views, 3, 4]` of matrices `K` and poses `R`, `t`, differentiable in all three; see `softrast.pinhole`."""
     R = _floats(R, "R")
-    K, t = (_floats(x, name).to(R.dtype) for x, name in ((K, "K"), (t, "t")))
+    K, t = (_floats(x, name).to(R) for x, name in ((K, "K"), (t, "t")))
     return _cameras.pinhole(_torch, K, R, t, size, convention)
 
 
@@ -73,7 +81,7 @@ def project(vertices: _torch.Tensor, cameras: _torch.Tensor) -> _torch.Tensor:
     vertices, cameras = _floats(vertices, "vertices"), _floats(cameras, "cameras")
     vertices = vertices[None] if vertices.dim() == 2 else vertices
     views = _shapes.project(vertices.shape, cameras.shape)
-    cameras = cameras.to(vertices.dtype)
+    cameras = cameras.to(vertices)
     if cameras.dim() == 2:
         cameras = _ops.value("orbit_matrix", _ORBIT_MATRIX, [cameras])[0]
     cameras = cameras.expand(views, 3, 4)
@@ -109,7 +117,8 @@ def _scene(
         return renderer._by_own_name, inputs
     phi = _floats(phi, "phi")
     _shapes.parameters("phi", phi.shape, renderer._parameters)
-    return renderer._by_phi_name, [*inputs, phi]
+    # On the CPU φ may be of any type.
+    return renderer._by_phi_name, [*inputs, phi.to("cpu", _torch.float64) if vertices.is_cuda else phi.cpu()]
 
 
 def silhouette(renderer: _softrast.Renderer, vertices: _torch.Tensor, phi: _Optional[_torch.Tensor] = None) -> _torch.Tensor:
@@ -165,7 +174,7 @@ def hard_silhouette(vertices: _torch.Tensor, faces: _softrast._ArrayLike, size: 
 
     `faces` are `[F, 3]`, an array or a tensor; `size` is a number of pixels, or `(height, width)`.
     """
-    vertices = _floats(vertices, "vertices")
+    vertices = _floats(vertices, "vertices", cuda=False)
     return _torch.from_numpy(_softrast.hard_silhouette(vertices.detach().contiguous().numpy(), faces, size)).to(vertices.dtype)
 
 
@@ -191,7 +200,7 @@ def _loss(name: str, image: _torch.Tensor, target: _torch.Tensor) -> _torch.Tens
     image, target = _floats(image, "image"), _floats(target, "target")
     _shapes.images(image.shape, target.shape)
     kind, handle = _LOSSES[name]
-    return _ops.value(kind, handle, [image, target.to(image.dtype)])[0]
+    return _ops.value(kind, handle, [image, target.to(image)])[0]
 
 
 def silhouette_loss(
@@ -215,7 +224,7 @@ def _loss_scene(
     """The name of a renderer's loss and its inputs: vertices `[views, 3, V]` and the target."""
     target = _floats(target, "target")
     _shapes.images((vertices.shape[0], *renderer._size), target.shape)
-    return renderer._loss_names[loss], [vertices, target.to(vertices.dtype)]
+    return renderer._loss_names[loss], [vertices, target.to(vertices)]
 
 
 def jvp(
@@ -229,7 +238,7 @@ def jvp(
     name, inputs = _scene(renderer, vertices, phi)
     directions = [_along(direction, vertices).transpose(1, 2)]
     if phi is not None:
-        directions.append(None if phi_direction is None else _floats(phi_direction, "phi_direction").to(inputs[1].dtype))
+        directions.append(None if phi_direction is None else _floats(phi_direction, "phi_direction").to(inputs[1]))
     image, *kept = _ops.value("silhouette", name, inputs)
     return image, _ops.jvp("silhouette", name, inputs, kept, directions)
 
@@ -261,7 +270,7 @@ def _along(direction: _torch.Tensor, vertices: _torch.Tensor) -> _torch.Tensor:
     direction = _floats(direction, "direction")
     if direction.shape != vertices.shape:
         raise ValueError(f"direction must be {list(vertices.shape)} as the vertices are, found {list(direction.shape)}")
-    return direction.to(_floats(vertices, "vertices").dtype)
+    return direction.to(_floats(vertices, "vertices"))
 
 
 def _judged(renderer, vertices, target, loss, phi, direction):
@@ -276,7 +285,7 @@ def _judged(renderer, vertices, target, loss, phi, direction):
         return losses, gradient.transpose(1, 2), None
     wanted = [True, *[False] * (len(inputs) - 1)]
     image, *kept = _ops.value("silhouette", name, inputs)
-    target = _floats(target, "target").to(image.dtype)
+    target = _floats(target, "target").to(image)
     _shapes.images(image.shape, target.shape)
     pair = [image, target]
     (losses,) = _ops.value(kind, handle, pair)
@@ -305,32 +314,31 @@ def blend(
     `[P]` and `phi_depth` `[Q]` receive gradients of both orders.
     """
     vertices, attributes = _floats(vertices, "vertices"), _floats(attributes, "attributes")
-    dtype = vertices.dtype
     _shapes.vertices(vertices.shape, renderer._least)
     attributes = attributes[None] if attributes.dim() == 2 else attributes
-    texture = None if texture is None else _floats(texture, "texture").to(dtype)
+    texture = None if texture is None else _floats(texture, "texture").to(vertices)
     least, name = renderer._least, renderer._plain_name
     if corners is not None or texture is not None:
         corners = None if corners is None else _shapes.faces(corners, "corners")
         least = least if corners is None else corners.max(initial=-1) + 1
         name = renderer._blend(corners, None if texture is None else (texture.shape[0], texture.shape[1])).handle
     channels = _shapes.attributes(attributes.shape, vertices.shape[0], least, None if texture is None else tuple(texture.shape))
-    background = _number(background, "background", dtype)
+    background = _number(background, "background", vertices)
     _shapes.background(background.shape, channels)
-    log_weight = _number(renderer._log_weight if log_weight is None else log_weight, "log_weight", dtype)
+    log_weight = _number(renderer._log_weight if log_weight is None else log_weight, "log_weight", vertices)
     if log_weight.numel() != 1:
         raise ValueError(f"log_weight must be a number or [1], found {list(log_weight.shape)}")
     both = []
     for x, own, of in ((phi, renderer._phi[0], "phi"), (phi_depth, renderer._phi[1], "phi_depth")):
-        x = _torch.tensor(own, dtype=_torch.float64) if x is None else _floats(x, of).double()
+        x = _torch.tensor(own, dtype=_torch.float64) if x is None else _floats(x, of).to("cpu", _torch.float64)
         _shapes.parameters(of, x.shape, len(own))
         both.append(x)
     behind = _torch.cat([background.expand(channels), log_weight.reshape(1)])
-    inputs = [vertices.transpose(1, 2).contiguous(), attributes.to(dtype), _torch.cat(both), behind]
+    inputs = [vertices.transpose(1, 2).contiguous(), attributes.to(vertices), _torch.cat(both), behind]
     if texture is not None:
         inputs.append(_torch.nn.functional.pad(texture.reshape(-1, channels), (0, 4 - channels)))
     return _ops.value("blend", name, inputs)[0]
 
 
-def _number(x: _Number, name: str, dtype: _torch.dtype) -> _torch.Tensor:
-    return _floats(x, name).to(dtype) if isinstance(x, _torch.Tensor) else _torch.tensor(x, dtype=dtype)
+def _number(x: _Number, name: str, like: _torch.Tensor) -> _torch.Tensor:
+    return _floats(x, name).to(like) if isinstance(x, _torch.Tensor) else _torch.tensor(x, dtype=like.dtype, device=like.device)
