@@ -27,7 +27,7 @@ pub(crate) struct Array<'a> {
 pub(crate) enum Floats<'a> {
     F32(Cow<'a, [f32]>),
     F64(Cow<'a, [f64]>),
-    /// Those of a tensor on a device, see [`crate::device::On`].
+    /// A tensor on a device, see [`crate::device::On`].
     Device(Arc<dyn Any + Send + Sync>),
 }
 

@@ -35,15 +35,14 @@ impl Device for Cuda {
     fn import(arrays: &[&Lent<'_>]) -> Result<Vec<Tensor<Self, 1>>, String> {
         cuda_device_name().map_err(|error| error.to_string())?;
         let Some(first) = arrays.first() else { return Ok(Vec::new()) };
-        let own = CudaDevice::new(first.device[1] as usize);
         let current = Current::new(first.device[1])?;
-        let client = CudaRuntime::client(&own);
+        let client = CudaRuntime::client(&current.own);
         let empty = |array: &&Lent<'_>| client.empty(array.count() * size_of::<f32>());
         let buffers: Vec<Handle> = arrays.iter().map(empty).collect();
-        current.copies(&own, &buffers, arrays, Way::In)?;
+        current.copies(&buffers, arrays, Way::In)?;
         let tensors = buffers.into_iter().zip(arrays).map(|(buffer, array)| {
             let shape = [array.count()].into();
-            let (client, own) = (client.clone(), own.clone());
+            let (client, own) = (client.clone(), current.own.clone());
             CubeTensor::new_contiguous(client, own, shape, buffer, DType::F32)
         });
         Ok(tensors.map(|tensor| Tensor::from_primitive(TensorPrimitive::Float(tensor))).collect())
@@ -51,12 +50,11 @@ impl Device for Cuda {
 
     fn export(tensors: Vec<Tensor<Self, 1>>, arrays: &[&Lent<'_>]) -> Result<(), String> {
         let Some(first) = arrays.first() else { return Ok(()) };
-        let own = CudaDevice::new(first.device[1] as usize);
         let current = Current::new(first.device[1])?;
         let buffer =
             |tensor: Tensor<Self, 1>| into_contiguous(tensor.into_primitive().tensor()).handle;
         let buffers: Vec<Handle> = tensors.into_iter().map(buffer).collect();
-        current.copies(&own, &buffers, arrays, Way::Out)
+        current.copies(&buffers, arrays, Way::Out)
     }
 }
 
@@ -68,6 +66,7 @@ enum Way {
 
 /// The primary context of a device, which all libraries of a process share, as the current one of this thread.
 struct Current {
+    own: CudaDevice,
     device: CUdevice,
     before: CUcontext,
 }
@@ -77,22 +76,20 @@ impl Current {
         let enter = || {
             let device = device::get(index)?;
             let before = ctx::get_current()?.unwrap_or(std::ptr::null_mut());
-            // SAFETY: the device is one of the driver's, and the context is retained until it is current no more.
-            unsafe { ctx::set_current(primary_ctx::retain(device)?)? };
-            Ok(Self { device, before })
+            // SAFETY: the device is one of the driver's.
+            let context = unsafe { primary_ctx::retain(device)? };
+            let own = CudaDevice::new(index as usize);
+            let current = Self { own, device, before };
+            // SAFETY: the context is retained until it is no longer current.
+            unsafe { ctx::set_current(context)? };
+            Ok(current)
         };
         enter().map_err(failed)
     }
 
     /// Copies between buffers of the kernels and arrays of as many numbers, and waits until they are done.
-    fn copies(
-        &self,
-        own: &CudaDevice,
-        buffers: &[Handle],
-        arrays: &[&Lent<'_>],
-        way: Way,
-    ) -> Result<(), String> {
-        let client = CudaRuntime::client(own);
+    fn copies(&self, buffers: &[Handle], arrays: &[&Lent<'_>], way: Way) -> Result<(), String> {
+        let client = CudaRuntime::client(&self.own);
         let resource = |buffer: &Handle| client.get_resource(buffer.clone());
         let resources = buffers.iter().map(resource).collect::<Result<Vec<_>, _>>();
         let resources = resources.map_err(|error| error.to_string())?;
@@ -100,7 +97,7 @@ impl Current {
         if sizes.any(|(size, array)| size < (array.count() * size_of::<f32>()) as u64) {
             return Err("a buffer of the kernels is smaller than its array".to_owned());
         }
-        Cuda::sync(own).map_err(|error| error.to_string())?;
+        Cuda::sync(&self.own).map_err(|error| error.to_string())?;
         let mut done = Ok(());
         for (resource, array) in resources.iter().zip(arrays) {
             let (inner, outer) = (resource.resource(), array.address as u64);

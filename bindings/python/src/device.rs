@@ -158,7 +158,7 @@ impl<B: RasterBackend> Store for On<B> {
     }
 }
 
-/// The CPU as a device: what is not of CUDA is tested with it.
+/// The CPU as a device, with which everything except CUDA itself is tested.
 impl Device for NdArray<f32> {
     fn import(arrays: &[&Lent<'_>]) -> Result<Vec<Tensor<Self, 1>>, String> {
         let tensor = |array: &&Lent<'_>| {

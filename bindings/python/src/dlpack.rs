@@ -7,7 +7,7 @@ use pyo3::{
     types::{PyCapsule, PyCapsuleMethods},
 };
 
-use crate::guard::refused;
+use crate::{arrays::Float, guard::refused};
 
 /// The CPU among the devices of DLPack.
 pub(crate) const CPU: i32 = 1;
@@ -42,7 +42,7 @@ pub(crate) struct Lent<'a> {
 }
 
 impl<'a> Lent<'a> {
-    /// What a capsule lends while it exists and nobody else takes its array over.
+    /// The array of a capsule, which lends it while it exists and nobody else takes it over.
     pub(crate) fn new(capsule: &'a Bound<'_, PyCapsule>) -> PyResult<Self> {
         // A capsule whose array was taken over has another name.
         let managed = capsule.pointer_checked(Some(c"dltensor"))?.cast::<Managed>();
@@ -59,16 +59,17 @@ impl<'a> Lent<'a> {
             if strides.is_some_and(|strides| length > 1 && strides[k] != count) {
                 return Err(refused("an array is not contiguous"));
             }
-            count = count.checked_mul(length).filter(|&count| count > 0).ok_or_else(empty)?;
+            let more = count.checked_mul(length).filter(|&more| more > 0 && more <= i64::MAX / 8);
+            count = more.ok_or_else(|| refused("an array has no numbers, or too many"))?;
         }
         let (code, bits, lanes) = (managed.code, managed.bits, managed.lanes);
         if code != 2 || lanes != 1 || !matches!(bits, 32 | 64) || lengths.len() != axes {
             return Err(refused("arrays must be float32 or float64"));
         }
-        let address = managed.data.addr() + managed.offset as usize;
-        if managed.data.is_null() || address % usize::from(bits / 8) != 0 {
-            return Err(refused("an array lies nowhere, or between two numbers"));
-        }
+        let address = managed.data.addr().checked_add(managed.offset as usize);
+        let aligned = |address: &usize| address.is_multiple_of(usize::from(bits / 8));
+        let address = address.filter(aligned).filter(|_| !managed.data.is_null());
+        let address = address.ok_or_else(|| refused("an array lies nowhere, or is not aligned"))?;
         let dims = lengths.iter().map(|&length| length as usize).collect();
         let device = managed.device;
         Ok(Self { address, dims, device, wide: bits == 64, capsule: PhantomData })
@@ -78,25 +79,26 @@ impl<'a> Lent<'a> {
         self.dims.iter().product()
     }
 
-    /// The numbers, if they have this type and lie on the CPU.
-    pub(crate) fn numbers<F: numpy::Element + Copy>(&self) -> Option<&'a [F]> {
-        let fits = self.device[0] == CPU && size_of::<F>() == if self.wide { 8 } else { 4 };
-        // SAFETY: these are as many aligned floats in memory that the capsule keeps.
-        fits.then(|| unsafe { slice::from_raw_parts(self.address as *const F, self.count()) })
+    /// Whether the numbers have this type and lie on the CPU.
+    fn holds<F: Float>(&self) -> bool {
+        self.device[0] == CPU && size_of::<F>() == if self.wide { 8 } else { 4 }
     }
 
-    /// Writes numbers of the CPU, and returns whether there are as many of this type.
-    pub(crate) fn write<F: numpy::Element + Copy>(&self, values: &[F]) -> bool {
-        let fits = self.numbers::<F>().is_some_and(|numbers| numbers.len() == values.len());
+    /// The numbers, if they have this type and lie on the CPU.
+    pub(crate) fn numbers<F: Float>(&self) -> Option<&'a [F]> {
+        // SAFETY: these are as many aligned floats in memory that the capsule keeps.
+        self.holds::<F>()
+            .then(|| unsafe { slice::from_raw_parts(self.address as *const F, self.count()) })
+    }
+
+    /// Writes numbers on the CPU. Returns whether there are as many of this type.
+    pub(crate) fn write<F: Float>(&self, values: &[F]) -> bool {
+        let fits = self.holds::<F>() && self.count() == values.len();
         if fits {
             let to = self.address as *mut F;
-            // SAFETY: as for `numbers`; results were allocated for this call, and nothing else reads them yet.
+            // SAFETY: as for `numbers`; results were allocated for this call, and nothing else uses them yet.
             unsafe { to.copy_from_nonoverlapping(values.as_ptr(), values.len()) };
         }
         fits
     }
-}
-
-fn empty() -> PyErr {
-    refused("an array has no numbers, or more than there are addresses")
 }

@@ -154,7 +154,7 @@ impl Function {
         found.into_iter().map(|array| array.into_numpy(py)).collect()
     }
 
-    /// Writes the results of a derivative to `outputs`, for arrays on one device that are given as unused capsules of DLPack. All are float32, but for
+    /// Writes the results of a derivative to `outputs`, for arrays on one device that are given as unused capsules of DLPack. All are float32, except
     /// φ and its gradient, which are float64 on the CPU. There are no further axes in front.
     fn call_dlpack<'py>(
         &self,

@@ -40,7 +40,7 @@ def why_not():
 
 @pytest.fixture(params=["the CPU as the device", pytest.param("cuda", marks=pytest.mark.skipif(bool(why_not()), reason=str(why_not())))])
 def there(request, monkeypatch):
-    """Moves a tensor to the device, in float32, but for φ and the background, which may lie elsewhere."""
+    """Moves a tensor to the device, in float32, except φ and the background, which may lie elsewhere."""
     if request.param == "cuda":
         return lambda x: x.to("cuda", torch.float32) if x.dim() > 1 else x
     host = _ops._computed
@@ -285,7 +285,7 @@ def test_a_capsule_is_read_where_it_says():
     (lambda: capsule(ORBITS.astype(np.float16)), "arrays must be float32 or float64"),
     (lambda: capsule(ORBITS, shape=[0, 4]), "an array has no numbers"),
     (lambda: capsule(ORBITS, shape=[-2, 4]), "an array has no numbers"),
-    (lambda: capsule(ORBITS, shape=[2 ** 62, 4]), "an array has no numbers, or more than there are addresses"),
+    (lambda: capsule(ORBITS, shape=[2 ** 62, 4]), "an array has no numbers, or too many"),
     (lambda: capsule(ORBITS, device=(4, 0)), "softrast does not draw on the device of the arrays"),
     (lambda: capsule(ORBITS.astype(np.float64)), "arrays on a device must be float32|arrays of a call must be of one type"),
     (lambda: capsule(ORBITS.reshape(4, 2)), "arrays of these shapes do not fit"),
