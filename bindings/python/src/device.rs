@@ -6,7 +6,7 @@ use softrast_raster::{
     RasterBackend,
     low_level::{FusedOp, Pass},
 };
-use softrast_tensor::{DType, FloatTensor, NdArray, Tensor, TensorData, TensorPrimitive};
+use softrast_tensor::{DType, NdArray, Tensor, TensorData, TensorMetadata as _, TensorPrimitive};
 
 use crate::{
     arrays::{Array, Floats},
@@ -72,14 +72,6 @@ const WIDE: &str = "arrays on a device must be float32: convert them with float(
 #[derive(Clone)]
 pub(crate) struct On<B>(PhantomData<B>);
 
-fn primitive<B: RasterBackend>(tensor: &Tensor<B, 1>) -> FloatTensor<B> {
-    tensor.clone().into_primitive().tensor()
-}
-
-fn flat<B: RasterBackend>(tensor: FloatTensor<B>, count: usize) -> Tensor<B, 1> {
-    Tensor::from_primitive(TensorPrimitive::Float(B::float_reshape(tensor, [count].into())))
-}
-
 impl<B: RasterBackend> Store for On<B> {
     type Slice = Tensor<B, 1>;
     type Owned = Tensor<B, 1>;
@@ -143,14 +135,14 @@ impl<B: RasterBackend> Store for On<B> {
         inputs: &[&Tensor<B, 1>],
         dims: &[Vec<usize>],
     ) -> Tensor<B, 1> {
-        let mut tensors: Vec<_> = inputs.iter().map(|tensor| primitive(tensor)).collect();
+        let primitive = |tensor: &&Tensor<B, 1>| (*tensor).clone().into_primitive().tensor();
+        let mut tensors: Vec<_> = inputs.iter().map(primitive).collect();
         for (tensor, dims) in tensors.iter_mut().zip(dims) {
             *tensor = B::float_reshape(tensor.clone(), dims.clone().into());
         }
-        let found =
-            Tensor::<B, 1>::from_primitive(TensorPrimitive::Float(B::run(op, pass, tensors)));
+        let found = B::run(op, pass, tensors);
         let count = found.shape().num_elements();
-        flat(found.into_primitive().tensor(), count)
+        Tensor::from_primitive(TensorPrimitive::Float(B::float_reshape(found, [count].into())))
     }
 
     fn run_taped(of: &Taped, pass: &Pass, inputs: &[&Tensor<B, 1>]) -> Tensor<B, 1> {
