@@ -206,10 +206,10 @@ def test_phi_and_cameras_may_lie_on_a_card_or_beside_it():
 
 @on_a_card
 def test_every_card_draws_what_lies_on_it():
-    expected = st.silhouette(OWN, SEEN.float().cuda(0)).cpu()
+    expected = st.silhouette(OWN, SEEN)
     for k in range(torch.cuda.device_count()):
         found = st.silhouette(OWN, SEEN.float().cuda(k))
-        assert found.device.index == k and torch.equal(found.cpu(), expected)
+        assert found.device.index == k and apart(found, expected) < PIXELS
     assert torch.cuda.current_device() == 0
 
 
