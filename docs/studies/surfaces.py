@@ -48,7 +48,7 @@ def svg():
         ends.append((points[-1], MESHES[k], COLOURS[k]))
     for (a, b), name, colour in ends:
         yield f'<text x="{a + 8:.1f}" y="{b + 4:.1f}" fill="{colour}">{name}</text>'
-    yield '<text x="270" y="392" text-anchor="middle">seconds on two CPU cores</text><text transform="translate(18 185) rotate(-90)" text-anchor="middle">error (lower is better)</text></svg>'
+    yield '<text x="270" y="392" text-anchor="middle">CPU seconds</text><text transform="translate(18 185) rotate(-90)" text-anchor="middle">error (lower is better)</text></svg>'
 
 
 (FOLDER / "surfaces.svg").write_text("\n".join(svg()) + "\n", encoding="utf-8")

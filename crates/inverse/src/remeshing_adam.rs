@@ -5,7 +5,7 @@ use softrast_tensor::{Backend, Element, Tensor, TensorData};
 
 /// Decay rates of the mean gradient, and of the mean of its squared length.
 const BETA: [f32; 2] = [0.7, 0.9];
-/// Step of a vertex relative to the target length of its edges.
+/// Step of a vertex relative to the shortest target length of edges.
 const RATE: f64 = 0.3;
 /// Number of smoothings of the gradient, and fraction of the way to the mean of its neighbours in each.
 const SMOOTHED: (usize, f32) = (2, 0.5);
@@ -17,6 +17,11 @@ const ACROSS: f32 = 0.02;
 const EVERY: usize = 3;
 /// Factor of the edge length at the largest number of faces, because not all faces are equilateral.
 const ROOM: f64 = 1.2;
+/// Angle in radians by which the surface turns along an edge of the shortest target length, where edges are that short. Along an edge as
+/// long as the curvature permits, the surface deviates by an eighth of this times the shortest length.
+const TURN: f32 = 0.25;
+/// Smoothings of the curvature, so that edges of neighbouring vertices have similar lengths.
+const CURVATURE_SMOOTHED: usize = 3;
 /// Least squared length of a gradient, so that a vertex without gradient does not move.
 const LEAST: f32 = 1e-24;
 /// Columns of optimiser state per vertex: mean gradient, and the mean of its squared length.
@@ -65,13 +70,15 @@ const RATE_OF_COLOURS: f32 = 0.05;
 /// # Ok::<(), softrast_mesh::MeshError>(())
 /// ```
 ///
-/// Source: Palfinger 2022 (remeshing) and Adam (Kingma and Ba 2015); the constants are our own.
+/// Source: Palfinger 2022 (remeshing), Dunyach et al. 2013 (lengths by curvature) and Adam (Kingma and Ba 2015); the constants are our own.
 #[derive(Clone, Debug)]
 pub struct RemeshingAdam {
     surface: ClosedSurface,
     geometry: SurfaceGeometry,
-    /// Requested length of edges.
+    /// Shortest target length of edges.
     length: f64,
+    /// Longest target length relative to the shortest.
+    longest: f64,
     steps: usize,
     /// Relative to [`RATE`].
     rate: f64,
@@ -116,14 +123,27 @@ impl RemeshingAdam {
 
     fn of_surface(surface: ClosedSurface, length: f64) -> Self {
         let geometry = SurfaceGeometry::new(surface.faces(), surface.columns::<3>(0));
-        let (rate, most, smoothing) = (1.0, Self::MOST_FACES, 1.0);
-        Self { surface, geometry, length, steps: 0, rate, most, smoothing }
+        let (longest, rate, most, smoothing) = (1.0, 1.0, Self::MOST_FACES, 1.0);
+        Self { surface, geometry, length, longest, steps: 0, rate, most, smoothing }
     }
 
     /// Sets the largest number of faces; edges become as long as it requires.
     #[must_use]
     pub fn with_most_faces(mut self, most: usize) -> Self {
         self.most = most;
+        self
+    }
+
+    /// Lets target lengths of edges follow the curvature, from the length set, where the surface turns by a quarter of a radian or more along
+    /// an edge of it, to `longest` times this length, where the surface is flat. A rough surface is curved everywhere.
+    ///
+    /// # Panics
+    ///
+    /// If `longest` is below 1 or not finite.
+    #[must_use]
+    pub fn with_longest(mut self, longest: f64) -> Self {
+        assert!(longest >= 1.0 && longest.is_finite(), "edges of {longest} times the length");
+        self.longest = longest;
         self
     }
 
@@ -149,7 +169,7 @@ impl RemeshingAdam {
         self.rate = rate;
     }
 
-    /// Sets the target length of edges, in the units of the mesh.
+    /// Sets the target length of edges, the shortest if lengths follow the curvature, in the units of the mesh.
     ///
     /// # Panics
     ///
@@ -216,9 +236,8 @@ impl RemeshingAdam {
         }
         self.step_vertices(&gradient);
         if self.steps.is_multiple_of(EVERY) {
-            self.surface.set_length(self.length.max(self.least_length()));
+            self.aim();
             self.surface.remesh(self.most);
-            self.surface.set_length(self.length);
             self.geometry =
                 SurfaceGeometry::new(self.surface.faces(), self.surface.columns::<3>(0));
         } else {
@@ -232,8 +251,8 @@ impl RemeshingAdam {
         let away = geometry.umbrella(geometry.positions());
         let power = |beta: f32| 1.0 - beta.powi(self.steps.min(1 << 20) as i32);
         let corrections = BETA.map(power);
-        let (rate, across) =
-            ((RATE * self.rate) as f32, ACROSS * (self.rate * self.smoothing) as f32);
+        let (rate, length) = ((RATE * self.rate) as f32, self.length as f32);
+        let across = ACROSS * (self.rate * self.smoothing) as f32;
         let width = surface.width();
         let rows = surface.numbers_mut().par_chunks_exact_mut(width).with_min_len(AT_ONCE);
         rows.enumerate().for_each(|(vertex, row)| {
@@ -246,7 +265,7 @@ impl RemeshingAdam {
             moments[3] += (1.0 - BETA[1]) * (dot(g, g) - moments[3]);
             let size = (moments[3] / corrections[1]).max(LEAST).sqrt();
             let mean = [moments[0], moments[1], moments[2]];
-            let step = rate * row[ClosedSurface::LENGTH] / (size * corrections[0]);
+            let step = rate * length / (size * corrections[0]);
             let out = dot(away, normal);
             for k in 0..3 {
                 let along = away[k] - out * normal[k];
@@ -255,10 +274,25 @@ impl RemeshingAdam {
         });
     }
 
-    /// Slightly more than the edge length of the surface at its largest number of faces, all equilateral.
-    fn least_length(&self) -> f64 {
-        let area = self.geometry.area(self.faces());
-        ROOM * (4.0 / 3f64.sqrt() * area / self.most as f64).sqrt()
+    /// Sets the target length of edges around each vertex: by the curvature if it matters, and longer if there would be too many faces.
+    fn aim(&mut self) {
+        self.surface.set_length(self.length);
+        let width = self.surface.width();
+        if self.longest > 1.0 {
+            let (shortest, longest) = (self.length as f32, (self.longest * self.length) as f32);
+            let curvatures = self.geometry.curvatures(CURVATURE_SMOOTHED);
+            let rows = self.surface.numbers_mut().chunks_exact_mut(width);
+            for (row, curvature) in rows.zip(curvatures) {
+                // An edge of length l deviates by l² c / 8 from a surface of curvature c.
+                let length = (TURN * shortest / curvature.max(f32::MIN_POSITIVE)).sqrt();
+                row[ClosedSurface::LENGTH] = length.clamp(shortest, longest);
+            }
+        }
+        let longer = (ROOM * (self.surface.wanted_faces() / self.most as f64).sqrt()) as f32;
+        if longer > 1.0 {
+            let rows = self.surface.numbers_mut().chunks_exact_mut(width);
+            rows.for_each(|row| row[ClosedSurface::LENGTH] *= longer);
+        }
     }
 
     /// Moves the colours against a gradient, and towards the means of their neighbours.
@@ -290,3 +324,6 @@ fn at(numbers: &[f32], vertex: usize) -> [f32; 3] {
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,8 +13,10 @@ const LEAST: f64 = 64.0;
 const MOST: f64 = 256.0;
 /// The default is a multiple of this, so that it can be halved.
 const EVEN: f64 = 32.0;
-/// Length of edges in pixels, in all stages.
-const EDGE_PX: f64 = 2.4;
+/// Length of edges in pixels, in all stages: without normals, and the shortest with normals.
+const EDGE_PX: [f64; 2] = [2.4, 1.8];
+/// Longest edges relative to the shortest, with normals. The surface is rougher without: curvature would be that of noise.
+const LONGEST: f64 = 2.0;
 /// Fraction of a stage during which edges shorten to its length.
 const SHORTENS: f64 = 1.0 / 3.0;
 /// Fraction of the last stage after which the rate falls, and final over initial rate.
@@ -99,7 +101,8 @@ impl<'a> ShapeFit<'a> {
         Self { steps, ..self }
     }
 
-    /// Sets the final resolution to `size` × `size` pixels, `size` being at least 8. Edges become 2.4 of these pixels long.
+    /// Sets the final resolution to `size` × `size` pixels, `size` being at least 8. Edges become 2.4 of these pixels long;
+    /// if all views have normals, 1.8 where the surface is curved and up to 3.6 where it is flat.
     pub fn with_size(self, size: usize) -> Self {
         Self { size, ..self }
     }
@@ -140,7 +143,8 @@ impl<'a> ShapeFit<'a> {
         let reach = reaches().fold(0.0, f64::max);
         let half = reaches().sum::<f64>() / self.views.len() as f64;
         let mut levels = self.levels();
-        let length = |size: usize| EDGE_PX * 2.0 * half / size as f64;
+        let edge_px = EDGE_PX[usize::from(self.has_normals())];
+        let length = |size: usize| edge_px * 2.0 * half / size as f64;
         let has_colours = self.views.iter().any(|view| view.colours.is_some());
         let mut before = length(levels[levels.len() - 1][0].size);
         let colour = has_colours.then(|| mean_colour(&levels[levels.len() - 1]));
@@ -181,6 +185,11 @@ impl<'a> ShapeFit<'a> {
         Ok(FoundShape { mesh: mesh.with_colours(colours.collect())?, stopped })
     }
 
+    /// Whether all views have normals.
+    fn has_normals(&self) -> bool {
+        self.views.iter().all(|view| view.normals.is_some())
+    }
+
     /// Targets of all views by stage, those of the last stage first.
     fn levels(&self) -> Vec<Vec<Target>> {
         let coarsest = COARSEST[usize::from(self.start.is_some())];
@@ -219,7 +228,9 @@ impl<'a> ShapeFit<'a> {
         // Colours are a noisy cue to the surface, normals a better one.
         let by_colours = colour.is_some() && self.views.iter().all(|view| view.normals.is_none());
         let usual = if by_colours { BY_COLOURS } else { 1.0 };
-        Ok(shape.with_most_faces(self.most).with_smoothing(usual * self.smoothing))
+        let longest = if self.has_normals() { LONGEST } else { 1.0 };
+        let shape = shape.with_most_faces(self.most).with_smoothing(usual * self.smoothing);
+        Ok(shape.with_longest(longest))
     }
 }
 

@@ -128,9 +128,8 @@ impl SurfaceGeometry {
     ///
     /// If there are fewer than three numbers per vertex.
     pub fn umbrella(&self, numbers: &[f32]) -> Vec<f32> {
-        let Around { starts, ends, .. } = &self.around;
         self.around.of_vertices(|vertex| {
-            let around = &ends[starts[vertex] as usize..starts[vertex + 1] as usize];
+            let around = self.around.ends_at(vertex);
             let mut sum = [0.0; 3];
             for &other in around {
                 let other = at(numbers, other);
@@ -139,6 +138,33 @@ impl SurfaceGeometry {
             let here = at(numbers, vertex as u32);
             [0, 1, 2].map(|k| sum[k] / around.len() as f32 - here[k])
         })
+    }
+
+    /// Curvature at each vertex, `[vertices]`, at least 0, over the unit of length: the root of the summed squares of the differences of
+    /// normals along its edges, over that of the lengths. A sphere of radius r has 1 / r. The curvature is then smoothed `times` times, half
+    /// the way to the mean of the neighbours.
+    pub fn curvatures(&self, times: usize) -> Vec<f32> {
+        let curvature = |vertex: usize| {
+            let here = [&self.positions, &self.normals].map(|of| at(of, vertex as u32));
+            let mut squares = [0.0; 2];
+            for &other in self.around.ends_at(vertex) {
+                let there = [&self.positions, &self.normals].map(|of| at(of, other));
+                for k in 0..2 {
+                    let along = difference(there[k], here[k]);
+                    squares[k] += dot(along, along);
+                }
+            }
+            [(squares[1] / squares[0].max(LEAST)).sqrt()]
+        };
+        let mut curvatures = self.around.of_vertices(curvature);
+        for _ in 0..times {
+            curvatures = self.around.of_vertices(|vertex| {
+                let around = self.around.ends_at(vertex);
+                let sum: f32 = around.iter().map(|&other| curvatures[other as usize]).sum();
+                [0.5 * (curvatures[vertex] + sum / around.len() as f32)]
+            });
+        }
+        curvatures
     }
 }
 
@@ -171,9 +197,15 @@ impl Around {
         Self { starts, ends, corners }
     }
 
-    /// Computes three numbers for each vertex.
-    fn of_vertices(&self, of: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<f32> {
-        let mut all = vec![0.0; 3 * (self.starts.len() - 1)];
+    /// The other ends of the edges at a vertex.
+    #[inline(always)]
+    fn ends_at(&self, vertex: usize) -> &[u32] {
+        &self.ends[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+    }
+
+    /// Computes N numbers for each vertex.
+    fn of_vertices<const N: usize>(&self, of: impl Fn(usize) -> [f32; N] + Sync) -> Vec<f32> {
+        let mut all = vec![0.0; N * (self.starts.len() - 1)];
         let each = all.as_chunks_mut().0.par_iter_mut().with_min_len(AT_ONCE).enumerate();
         each.for_each(|(vertex, to)| *to = of(vertex));
         all
@@ -240,6 +272,21 @@ mod tests {
             };
             let expected = (moved(5e-3) - moved(-5e-3)) / 1e-2;
             assert!((f64::from(found[k]) - expected).abs() < 3e-3, "{} {expected}", found[k]);
+        }
+    }
+
+    #[test]
+    fn curvature_is_one_over_the_radius() {
+        let ball = icosphere(4);
+        let flat = flat(ball.positions()).iter().map(|x| 0.25 * x).collect();
+        for times in [0, 3] {
+            let geometry = SurfaceGeometry::new(ball.faces(), Vec::clone(&flat));
+            let curvatures = geometry.curvatures(times);
+            assert_eq!(curvatures.len(), ball.positions().len());
+            let mean = curvatures.iter().sum::<f32>() / curvatures.len() as f32;
+            assert!((mean - 4.0).abs() < 0.02, "{mean}");
+            // Normals by area are off next to the twelve vertices with five edges.
+            assert!(curvatures.iter().all(|c| (c - 4.0).abs() < 0.3));
         }
     }
 

@@ -147,6 +147,19 @@ impl ClosedSurface {
         self.numbers.chunks_exact_mut(self.width).for_each(|row| row[Self::LENGTH] = length);
     }
 
+    /// Number of faces that the target lengths ask for: the area of each face over that of an equilateral triangle whose sides are the
+    /// mean of the target lengths at its corners.
+    pub fn wanted_faces(&self) -> f64 {
+        let of_face = |face: &[u32; 3]| {
+            let across = normal(face.map(|v| place(&self.numbers, self.width, v)));
+            let target = |v: u32| self.numbers[v as usize * self.width + Self::LENGTH];
+            let side = face.iter().map(|&v| target(v)).sum::<f32>() / 3.0;
+            let equilateral = 0.5 * 3f32.sqrt() * side * side;
+            f64::from(dot(across, across).sqrt() / equilateral)
+        };
+        self.faces().iter().map(of_face).sum()
+    }
+
     /// The surface as a mesh.
     ///
     /// # Errors
@@ -287,6 +300,17 @@ mod tests {
         for row in surface.numbers().chunks_exact(5) {
             assert!((row[4] - 3.0 * row[0] + row[2]).abs() < 1e-5, "{row:?}");
         }
+    }
+
+    #[test]
+    fn wanted_faces_follow_from_lengths() {
+        let mut surface = ClosedSurface::new(&icosphere(3), 0.1, 0).unwrap();
+        (0..12).for_each(|_| _ = surface.remesh(100_000));
+        let ratio = surface.wanted_faces() / surface.faces().len() as f64;
+        assert!((0.8..1.25).contains(&ratio), "{ratio}");
+        let before = surface.wanted_faces();
+        surface.set_length(0.2);
+        assert!((surface.wanted_faces() / before - 0.25).abs() < 1e-3);
     }
 
     #[test]
