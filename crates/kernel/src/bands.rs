@@ -1,14 +1,16 @@
 //! Lists of the faces whose support reaches each band of rows, as culling leaves them.
 
+mod face_reach;
+
 use std::ops::Range;
 
 use rayon::prelude::*;
 
+use self::face_reach::{ReachOfFaces, reach_of_faces};
 use super::{
-    float::{Float as _, Vectors},
-    lanes::{GROUP, LANES, Lanes, Plain, Work, has_vectors, run},
-    reach::{Reach, grown, in_pixels, is_seen_clockwise},
-    real::splat,
+    float::Vectors,
+    lanes::{GROUP, on_vectors},
+    reach::{Reach, in_pixels},
     tasks::{filled, task},
 };
 use crate::ImageSize;
@@ -137,25 +139,14 @@ impl Bands {
             let reach = |(faces, reaches)| {
                 task("reach", || {
                     let turned = culls.then_some([x, y]);
-                    if has_vectors() {
-                        run::<F::Best, _>(ReachOfFaces::<F::Best> {
-                            places,
-                            turned,
-                            faces,
-                            radius,
-                            size,
-                            reaches,
-                        })
-                    } else {
-                        run::<Plain<F>, _>(ReachOfFaces::<Plain<F>> {
-                            places,
-                            turned,
-                            faces,
-                            radius,
-                            size,
-                            reaches,
-                        })
-                    }
+                    on_vectors!(reach_of_faces::<F>(ReachOfFaces {
+                        places,
+                        turned,
+                        faces,
+                        radius,
+                        size,
+                        reaches
+                    }))
                 })
             };
             let drawn = chunks.map(reach).sum();
@@ -163,79 +154,6 @@ impl Bands {
         };
         let views = vertices.par_chunks(3 * vertices_per_view.max(1)).map(view).collect();
         Self { views, count }
-    }
-}
-
-/// Writes the pixels that each face may reach, and counts the faces that are drawn.
-struct ReachOfFaces<'a, L: Lanes> {
-    /// Places of the vertices in the image.
-    places: &'a [[L::Float; 2]],
-    /// x and y of the vertices in NDC, where back faces are not drawn.
-    turned: Option<[&'a [L::Float]; 2]>,
-    faces: &'a [[u32; 3]],
-    /// In pixels.
-    radius: L::Float,
-    size: ImageSize,
-    reaches: &'a mut [Reach],
-}
-
-impl<L: Lanes> Work for ReachOfFaces<'_, L> {
-    type Output = usize;
-
-    #[inline(always)]
-    fn run(self) -> usize {
-        let Self { places, turned, faces, radius, size, reaches } = self;
-        let mut drawn = 0;
-        for (faces, reaches) in faces.chunks(LANES).zip(reaches.chunks_mut(LANES)) {
-            let mut corners = [[[L::Float::ZERO; LANES]; 3]; 2];
-            for (lane, face) in faces.iter().enumerate() {
-                for k in 0..3 {
-                    let [x, y] = places[face[k] as usize];
-                    (corners[0][k][lane], corners[1][k][lane]) = (x, y);
-                }
-            }
-            let [x, y] = &corners;
-            let columns = Pixels::<L>::new(x, radius, size.width);
-            let rows = Pixels::<L>::new(y, radius, size.height);
-            for (lane, reach) in reaches.iter_mut().enumerate() {
-                let [left, right] = [columns.start[lane] as u32, columns.end[lane] as u32];
-                let [top, bottom] = [rows.start[lane] as u32, rows.end[lane] as u32];
-                // A vertex that is not drawn is at infinity in both.
-                let mut is_drawn = columns.highest[lane] < L::Float::from_f64(f64::INFINITY);
-                if let Some([x, y]) = turned {
-                    is_drawn &=
-                        !is_seen_clockwise(faces[lane].map(|v| [x[v as usize], y[v as usize]]));
-                }
-                drawn += usize::from(is_drawn);
-                if is_drawn && left < right && top < bottom {
-                    *reach = Reach { top, bottom, left, right };
-                }
-            }
-        }
-        drawn
-    }
-}
-
-/// Pixels that faces may reach along an axis: first and after the last.
-struct Pixels<L: Lanes> {
-    start: [i32; LANES],
-    end: [i32; LANES],
-    highest: [L::Float; LANES],
-}
-
-impl<L: Lanes> Pixels<L> {
-    #[inline(always)]
-    fn new([a, b, c]: &[[L::Float; LANES]; 3], radius: L::Float, side: usize) -> Self {
-        let (a, b, c) = (L::of(a), L::of(b), L::of(c));
-        let highest = a.max(b).max(c);
-        let grown = L::splat(grown(radius, side));
-        let low = a.min(b).min(c) - grown + splat(1.0);
-        let most = splat(side as f64);
-        Self {
-            start: L::index_array(low.max(splat(0.0)).min(most).nearest()),
-            end: L::index_array((highest + grown).max(splat(0.0)).min(most).nearest()),
-            highest: highest.array(),
-        }
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
     bands::{Bands, Drawn, View},
     float::{Float, Vectors},
     gather::{Part, gather as gather_corners},
-    lanes::{self, Plain, has_vectors},
+    lanes::{self, on_vectors},
     reach::{Reach, within},
     real::{self, Dual, Real, Table},
     scene::{BandRef, Scene},
@@ -70,11 +70,7 @@ impl<F> Inputs<'_, F> {
 
 /// See [`Kernels::sums`](crate::Kernels::sums).
 pub(crate) fn forward<F: Vectors>(inputs: &Inputs<F>, bands: &Bands) -> Vec<F> {
-    if has_vectors() {
-        image::<F::Best>(&inputs.scene([&[]; 2]), bands)
-    } else {
-        image::<Plain<F>>(&inputs.scene([&[]; 2]), bands)
-    }
+    on_vectors!(image::<F>(&inputs.scene([&[]; 2]), bands))
 }
 
 /// See [`Kernels::sums_vjp`](crate::Kernels::sums_vjp).
@@ -85,11 +81,7 @@ pub(crate) fn vjp<F: Vectors>(
     wanted: [bool; 2],
 ) -> Vec<F> {
     let wanted = [wanted[0], wanted[1], false];
-    if has_vectors() {
-        gradient::<F::Best>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
-    } else {
-        gradient::<Plain<F>>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
-    }
+    on_vectors!(gradient::<F>(&inputs.scene([&[]; 2]), bands, upstream, wanted))
 }
 
 /// See [`Kernels::sums_vjp_of_vjp`](crate::Kernels::sums_vjp_of_vjp).
@@ -113,11 +105,7 @@ pub(crate) fn vjp_of_vjp<F: Vectors>(
         if along[0] { to_vertices } else { &still[0] },
         if along[1] { to_table } else { &still[1] },
     ];
-    if has_vectors() {
-        gradient::<Dual<F::Best>>(&inputs.scene(tangents), bands, upstream, wanted)
-    } else {
-        gradient::<Dual<Plain<F>>>(&inputs.scene(tangents), bands, upstream, wanted)
-    }
+    on_vectors!(gradient::<Dual<F>>(&inputs.scene(tangents), bands, upstream, wanted))
 }
 
 /// Runs the image part of a walk over all bands; `[views, height, width]`.

@@ -83,7 +83,7 @@ pub use self::{
 use super::{
     bands::View,
     float::{self, Vectors},
-    lanes::{Lanes, Plain, has_vectors, run},
+    lanes::{Lanes, on_vectors, run},
     real::{Dual, Float, Real},
     tasks::task,
 };
@@ -111,11 +111,7 @@ impl<F> Kept<F> {
 
 /// See [`Kernels::blend`](crate::Kernels::blend).
 pub(crate) fn forward<F: Vectors>(inputs: &Inputs<F>, kept: &Kept<F>) -> Vec<F> {
-    if has_vectors() {
-        drawn::<F::Best>(inputs, [&[]; 5], kept, None).image()
-    } else {
-        drawn::<Plain<F>>(inputs, [&[]; 5], kept, None).image()
-    }
+    on_vectors!(drawn::<F>(inputs, [&[]; 5], kept, None)).image()
 }
 
 /// See [`Kernels::blend_vjp`](crate::Kernels::blend_vjp).
@@ -126,11 +122,7 @@ pub(crate) fn vjp<F: Vectors>(
     wanted: [bool; 5],
 ) -> Vec<F> {
     let pull = Some((upstream, wanted));
-    if has_vectors() {
-        drawn::<F::Best>(inputs, [&[]; 5], kept, pull).gradient(wanted)
-    } else {
-        drawn::<Plain<F>>(inputs, [&[]; 5], kept, pull).gradient(wanted)
-    }
+    on_vectors!(drawn::<F>(inputs, [&[]; 5], kept, pull)).gradient(wanted)
 }
 
 /// See [`Kernels::blend_judged`](crate::Kernels::blend_judged).
@@ -141,11 +133,7 @@ pub(crate) fn judged<F: Vectors>(
     wanted: [bool; 5],
 ) -> [Vec<F>; 2] {
     assert!(!wanted[2], "a loss has no gradient with respect to the tables");
-    if has_vectors() {
-        of_judged::<F::Best>(inputs, kept, judge, wanted)
-    } else {
-        of_judged::<Plain<F>>(inputs, kept, judge, wanted)
-    }
+    on_vectors!(of_judged::<F>(inputs, kept, judge, wanted))
 }
 
 /// See [`Kernels::blend_vjp_of_vjp`](crate::Kernels::blend_vjp_of_vjp).
@@ -172,11 +160,7 @@ pub(crate) fn vjp_of_vjp<F: Vectors>(
     });
     let [wanted @ .., to_upstream] = wanted;
     let pull = Some((upstream, wanted));
-    let passed = if has_vectors() {
-        drawn::<Dual<F::Best>>(inputs, tangents, kept, pull)
-    } else {
-        drawn::<Dual<Plain<F>>>(inputs, tangents, kept, pull)
-    };
+    let passed = on_vectors!(drawn::<Dual<F>>(inputs, tangents, kept, pull));
     let image = if to_upstream { passed.image() } else { Vec::new() };
     let mut gradient = passed.gradient(wanted);
     gradient.extend(image);

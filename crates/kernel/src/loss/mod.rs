@@ -15,7 +15,7 @@ use super::{
     face::Face,
     float::{Float as _, Vectors},
     gather::{Part, gather as gather_corners},
-    lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
+    lanes::{LANES, Lanes, Work, on_vectors, run},
     list::{LISTED, List, group},
     pair::CornerSums,
     real::splat,
@@ -73,11 +73,7 @@ pub(crate) fn losses<F: Vectors>(
     with_gradient: bool,
 ) -> [Vec<F>; 2] {
     let asked = (loss, with_gradient);
-    if has_vectors() {
-        of_views::<F::Best>(&inputs.scene([&[]; 2]), bands, judged, asked)
-    } else {
-        of_views::<Plain<F>>(&inputs.scene([&[]; 2]), bands, judged, asked)
-    }
+    on_vectors!(of_views::<F>(&inputs.scene([&[]; 2]), bands, judged, asked))
 }
 
 fn of_views<L: Lanes>(
