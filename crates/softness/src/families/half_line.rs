@@ -84,38 +84,45 @@ fn where_begun<B: Backend, const D: usize, const N: usize>(
     f(y.clamp(0.0, FAR)).map(|it| it.mask_fill(before.clone(), 0.0))
 }
 
+/// Methods that differ only in the `sign` of [`law_distance`].
+macro_rules! shared {
+    ($sign:literal) => {
+        fn parameters(&self) -> usize {
+            L::SHAPES.len() + 2
+        }
+
+        fn logarithms(&self) -> usize {
+            L::SHAPES.len() + 1
+        }
+
+        fn default_phi(&self, scale: f64) -> Vec<f64> {
+            L::default_phi(scale)
+        }
+
+        curve!(self.density(phi, x) => {
+            let y = law_distance::<L, B, D>(&phi, x, $sign);
+            let [slope] = where_begun(y, |y| [L::law(&phi, y).slope]);
+            slope * per_scale(&phi)
+        });
+
+        curve!(self.optical_depth(phi, x) => {
+            let [depth, _] = self.depth_and_hazard(phi, x);
+            depth
+        });
+
+        curve!(self.hazard(phi, x) => {
+            let [_, hazard] = self.depth_and_hazard(phi, x);
+            hazard
+        });
+    };
+}
+
 impl<L: HalfLine> Softness for Forward<L> {
-    fn parameters(&self) -> usize {
-        L::SHAPES.len() + 2
-    }
-
-    fn logarithms(&self) -> usize {
-        L::SHAPES.len() + 1
-    }
-
-    fn default_phi(&self, scale: f64) -> Vec<f64> {
-        L::default_phi(scale)
-    }
+    shared!(1.0);
 
     curve!(self.value(phi, x) => {
         let [below] = where_begun(law_distance::<L, B, D>(&phi, x, 1.0), |y| [L::law(&phi, y).below]);
         below
-    });
-
-    curve!(self.density(phi, x) => {
-        let y = law_distance::<L, B, D>(&phi, x, 1.0);
-        let [slope] = where_begun(y, |y| [L::law(&phi, y).slope]);
-        slope * per_scale(&phi)
-    });
-
-    curve!(self.optical_depth(phi, x) => {
-        let [depth, _] = self.depth_and_hazard(phi, x);
-        depth
-    });
-
-    curve!(self.hazard(phi, x) => {
-        let [_, hazard] = self.depth_and_hazard(phi, x);
-        hazard
     });
 
     curve!([self.depth_and_hazard(phi, x); 2] => {
@@ -126,37 +133,11 @@ impl<L: HalfLine> Softness for Forward<L> {
 }
 
 impl<L: HalfLine> Softness for Reversed<L> {
-    fn parameters(&self) -> usize {
-        L::SHAPES.len() + 2
-    }
-
-    fn logarithms(&self) -> usize {
-        L::SHAPES.len() + 1
-    }
-
-    fn default_phi(&self, scale: f64) -> Vec<f64> {
-        L::default_phi(scale)
-    }
+    shared!(-1.0);
 
     curve!(self.value(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, -1.0);
         L::law(&phi, y.clamp(0.0, FAR)).above
-    });
-
-    curve!(self.density(phi, x) => {
-        let y = law_distance::<L, B, D>(&phi, x, -1.0);
-        let [slope] = where_begun(y, |y| [L::law(&phi, y).slope]);
-        slope * per_scale(&phi)
-    });
-
-    curve!(self.optical_depth(phi, x) => {
-        let [depth, _] = self.depth_and_hazard(phi, x);
-        depth
-    });
-
-    curve!(self.hazard(phi, x) => {
-        let [_, hazard] = self.depth_and_hazard(phi, x);
-        hazard
     });
 
     curve!([self.depth_and_hazard(phi, x); 2] => {
