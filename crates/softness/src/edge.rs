@@ -1,7 +1,10 @@
 use serde::{Deserialize, Serialize};
 use softrast_tensor::{Backend, Tensor};
 
-use crate::{Family, Softness, softness::curve};
+use crate::{
+    Family, Softness,
+    softness::{curve, forward},
+};
 
 /// A family applied to the signed distance of an edge, or to its signed square.
 ///
@@ -78,32 +81,9 @@ impl Softness for EdgeSoftness {
         [value, self.by_distance(slope, x)]
     });
 
-    fn parameters(&self) -> usize {
-        self.family.parameters()
-    }
-
-    fn default_phi(&self, scale: f64) -> Vec<f64> {
-        self.family.default_phi(scale)
-    }
-
-    fn logarithms(&self) -> usize {
-        self.family.logarithms()
-    }
-
-    /// In NDC, or NDC² for a squared distance.
-    fn scale(&self, phi: &[f64]) -> f64 {
-        self.family.scale(phi)
-    }
+    forward!(family);
 
     fn scale_is_squared(&self) -> bool {
         self.squared
-    }
-
-    fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
-        self.family.with_scale(phi, factor)
-    }
-
-    fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
-        self.family.with_scale_values(phi, factor)
     }
 }

@@ -1,6 +1,9 @@
 use softrast_tensor::{Backend, Tensor};
 
-use crate::{Softness, softness::curve};
+use crate::{
+    Softness,
+    softness::{curve, forward},
+};
 
 /// The mirrored step `1 - s(-x)` of a softness, with the same parameters.
 ///
@@ -41,21 +44,7 @@ impl<S: Softness> Softness for Mirrored<S> {
         [depth.neg(), hazard]
     });
 
-    fn parameters(&self) -> usize {
-        self.0.parameters()
-    }
-
-    fn default_phi(&self, scale: f64) -> Vec<f64> {
-        self.0.default_phi(scale)
-    }
-
-    fn logarithms(&self) -> usize {
-        self.0.logarithms()
-    }
-
-    fn scale(&self, phi: &[f64]) -> f64 {
-        self.0.scale(phi)
-    }
+    forward!(0);
 
     fn scale_is_squared(&self) -> bool {
         self.0.scale_is_squared()
@@ -63,13 +52,5 @@ impl<S: Softness> Softness for Mirrored<S> {
 
     fn width(&self, phi: &[f64]) -> f64 {
         self.0.width(phi)
-    }
-
-    fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
-        self.0.with_scale(phi, factor)
-    }
-
-    fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
-        self.0.with_scale_values(phi, factor)
     }
 }

@@ -194,6 +194,36 @@ macro_rules! curve {
 }
 pub(crate) use curve;
 
+/// Parameters and scale of a [`Softness`]: those of the softness in this field.
+macro_rules! forward {
+    ($inner:tt) => {
+        fn parameters(&self) -> usize {
+            self.$inner.parameters()
+        }
+
+        fn default_phi(&self, scale: f64) -> Vec<f64> {
+            self.$inner.default_phi(scale)
+        }
+
+        fn logarithms(&self) -> usize {
+            self.$inner.logarithms()
+        }
+
+        fn scale(&self, phi: &[f64]) -> f64 {
+            self.$inner.scale(phi)
+        }
+
+        fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
+            self.$inner.with_scale(phi, factor)
+        }
+
+        fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
+            self.$inner.with_scale_values(phi, factor)
+        }
+    };
+}
+pub(crate) use forward;
+
 /// The derivative of every entry of `of(x)` with respect to its own `x`, at an inner level of autodiff; ops on `B` are still tracked by the
 /// levels of `B`.
 fn slope<B: Backend, const D: usize>(

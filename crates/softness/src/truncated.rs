@@ -1,6 +1,9 @@
 use softrast_tensor::{Backend, Tensor};
 
-use crate::{Softness, softness::curve};
+use crate::{
+    Softness,
+    softness::{curve, forward},
+};
 
 /// A softness with bounded support: the coverage is 0 from `reach` scales outside the edge on, and 1 from as many inside.
 ///
@@ -49,32 +52,10 @@ impl<S: Softness> Softness for Truncated<S> {
         step.clamp(0.0, 1.0)
     });
 
-    fn parameters(&self) -> usize {
-        self.softness.parameters()
-    }
-
-    fn default_phi(&self, scale: f64) -> Vec<f64> {
-        self.softness.default_phi(scale)
-    }
-
-    fn logarithms(&self) -> usize {
-        self.softness.logarithms()
-    }
-
-    fn scale(&self, phi: &[f64]) -> f64 {
-        self.softness.scale(phi)
-    }
+    forward!(softness);
 
     fn scale_is_squared(&self) -> bool {
         self.softness.scale_is_squared()
-    }
-
-    fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
-        self.softness.with_scale(phi, factor)
-    }
-
-    fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
-        self.softness.with_scale_values(phi, factor)
     }
 }
 
