@@ -11,6 +11,7 @@ use serde_json::Value;
 use crate::{
     error::Trouble,
     gltf_buffers::{Content, Files, data},
+    gltf_component::Component,
 };
 
 /// The supported part of the JSON; everything else is skipped.
@@ -148,59 +149,6 @@ pub(crate) fn entry<'a>(list: &'a Value, of: &Value) -> &'a Value {
     number(of).and_then(|number| list.get(number)).unwrap_or(&Value::Null)
 }
 
-/// The component types, numbered from 5120 in glTF.
-#[derive(Clone, Copy)]
-enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
-}
-
-impl Component {
-    fn of(code: u64) -> Option<Self> {
-        Some(match code {
-            5120 => Self::I8,
-            5121 => Self::U8,
-            5122 => Self::I16,
-            5123 => Self::U16,
-            5125 => Self::U32,
-            5126 => Self::F32,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::U32 | Self::F32 => 4,
-        }
-    }
-
-    fn can_index(self) -> bool {
-        matches!(self, Self::U8 | Self::U16 | Self::U32)
-    }
-
-    /// The value of `bytes`, whose number is that of the type; exact for every value of every type.
-    fn value(self, bytes: &[u8], normalized: bool) -> f64 {
-        let mut low = [0; 4];
-        low[..bytes.len()].copy_from_slice(bytes);
-        let [a, b, ..] = low;
-        let (value, most): (f64, f64) = match self {
-            Self::I8 => (i8::from_le_bytes([a]).into(), i8::MAX.into()),
-            Self::U8 => (a.into(), u8::MAX.into()),
-            Self::I16 => (i16::from_le_bytes([a, b]).into(), i16::MAX.into()),
-            Self::U16 => (u16::from_le_bytes([a, b]).into(), u16::MAX.into()),
-            Self::U32 => (u32::from_le_bytes(low).into(), 1.0),
-            Self::F32 => (f32::from_le_bytes(low).into(), 1.0),
-        };
-        if normalized { (value / most).max(-1.0) } else { value }
-    }
-}
-
 impl<'a> Gltf<'a> {
     /// The content of the JSON; `bin` is the binary chunk. With the `folder` of the file also buffers in other files.
     pub(crate) fn read(
@@ -324,7 +272,7 @@ impl<'a> Gltf<'a> {
 
     /// Location of the entries of an accessor; `None` if they are zero, except sparse ones.
     fn source(&self, accessor: &Accessor) -> Result<Option<Source>, String> {
-        let (component, count) = (component(accessor.component_type)?, accessor.count);
+        let (component, count) = (Component::checked(accessor.component_type)?, accessor.count);
         match accessor.buffer_view {
             Some(view) => Ok(Some(Source { view, offset: accessor.byte_offset, component })),
             // Such entries take no bytes, so their number must be bounded.
@@ -358,7 +306,7 @@ impl<'a> Gltf<'a> {
         normalized: bool,
     ) -> Result<Vec<[f64; N]>, String> {
         let count = accessor.count;
-        let component = component(accessor.component_type)?;
+        let component = Component::checked(accessor.component_type)?;
         if normalized && matches!(component, Component::F32 | Component::U32) {
             return Err("floats and 32-bit integers cannot be normalized".to_owned());
         }
@@ -372,7 +320,7 @@ impl<'a> Gltf<'a> {
                 return Err(format!("{changed} sparse entries of {count}"));
             }
             let code = indices.component_type.unwrap_or_default();
-            let whole = self::component(code)?;
+            let whole = Component::checked(code)?;
             if !whole.can_index() {
                 return Err(format!("component type {code} cannot be an index"));
             }
@@ -392,10 +340,6 @@ impl<'a> Gltf<'a> {
         }
         Ok(values)
     }
-}
-
-fn component(code: u64) -> Result<Component, String> {
-    Component::of(code).ok_or_else(|| format!("{code} is not a component type of glTF"))
 }
 
 /// Location of contiguous or strided entries of equal size.

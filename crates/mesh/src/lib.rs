@@ -30,6 +30,7 @@ mod glb_texture;
 mod glb_writer;
 mod gltf;
 mod gltf_buffers;
+mod gltf_component;
 mod icosphere;
 mod material;
 mod mesh;
