@@ -19,7 +19,7 @@ use shape2d::Shape2d;
 use shape3d::Shape3d;
 use softrast_cli::{Common, Init, MethodArgs, SoftnessChoice, Task, Variant, usual_args};
 use softrast_inverse::{Instances, LearnConfig, OuterLoss, SIGMA};
-use softrast_lab::{machine, mean, paired, report::Table};
+use softrast_lab::{machine, mean, paired_among, report::Table};
 use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::HostBackend as B;
 use softrast_softness::Family;
@@ -116,7 +116,7 @@ fn short(x: f64) -> String {
 
 /// Mean paired difference and its interval; bold if the interval excludes 0.
 fn less(a: &[f64], b: &[f64]) -> String {
-    let (mean, [low, high]) = paired(a, b);
+    let (mean, [low, high]) = paired_among(1, a, b);
     let text = format!("{} ({} to {})", short(mean), short(low), short(high));
     if low > 0.0 || high < 0.0 { format!("**{text}**") } else { text }
 }

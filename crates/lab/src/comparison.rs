@@ -35,13 +35,8 @@ struct Difference {
     per_run: Vec<f64>,
 }
 
-/// Mean of the elementwise differences of two lists, and its 95 % interval.
-pub fn paired(values: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
-    let differences: Vec<f64> = values.iter().zip(reference).map(|(a, b)| a - b).collect();
-    (mean(&differences), mean_interval(&differences))
-}
-
-/// [`paired`] with joint 95 % intervals for this number of `comparisons`. Source: Bonferroni's correction.
+/// Mean of the elementwise differences of two lists, and its interval, which is jointly at 95 % for this number of `comparisons`.
+/// Source: Bonferroni's correction.
 pub fn paired_among(comparisons: usize, values: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
     let differences: Vec<f64> = values.iter().zip(reference).map(|(a, b)| a - b).collect();
     let level = 1.0 - 0.05 / comparisons.max(1) as f64;

@@ -42,7 +42,7 @@ mod summary;
 mod viewer;
 mod world;
 
-pub use comparison::{Comparison, paired, paired_among};
+pub use comparison::{Comparison, paired_among};
 pub use error::{Error, Failure, INTERRUPTED, found};
 pub use evaluate::{Evaluation, Finished, Runner, seeds, was_interrupted};
 pub use files::{OutputFile, OutputFolder, write_atomically};
