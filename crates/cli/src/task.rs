@@ -32,6 +32,9 @@ pub trait Task: InverseProblem + Sized {
     /// Whether edges move: only then can images be drawn at lower resolution and tolerance, and a surrogate is useful.
     const MOVES_EDGES: bool = true;
 
+    /// The paper's numbers, if it has the task.
+    const PAPER: &'static Paper = &Paper::NONE;
+
     /// Hard errors above this justify another start.
     const RESTART_ABOVE: f64 = f64::INFINITY;
 
@@ -159,11 +162,6 @@ pub trait Task: InverseProblem + Sized {
     /// The task's own learned softness next to that of the start: a chart and its caption.
     fn own_chart(&self, _start: &[f64], _learned: &[f64]) -> Option<(Plot, &'static str)> {
         None
-    }
-
-    /// The paper's numbers, if it has the task.
-    fn paper() -> &'static Paper {
-        &Paper::NONE
     }
 }
 

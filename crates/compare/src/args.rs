@@ -119,13 +119,13 @@ fn crossing(text: &str) -> Result<String, String> {
 }
 
 /// Whether the bundled softness of a method exists for a task; a new task may have none.
-fn is_there(task: &'static dyn AnyTask, method: &MethodArgs) -> bool {
+fn is_there(task: &'static AnyTask, method: &MethodArgs) -> bool {
     let there = |name: &str| ScheduledSoftness::learned(name).is_ok();
     match &method.softness {
-        Some(SoftnessChoice::Searched) => ScheduledSoftness::searched(task.name()).is_ok(),
-        Some(SoftnessChoice::Preset) => ScheduledSoftness::preset(task.name()).is_ok(),
-        Some(SoftnessChoice::Learned(None)) => there(task.name()),
-        Some(SoftnessChoice::Learned(Some(kind))) => there(&learned_kind(task.name(), kind)),
+        Some(SoftnessChoice::Searched) => ScheduledSoftness::searched(task.name).is_ok(),
+        Some(SoftnessChoice::Preset) => ScheduledSoftness::preset(task.name).is_ok(),
+        Some(SoftnessChoice::Learned(None)) => there(task.name),
+        Some(SoftnessChoice::Learned(Some(kind))) => there(&learned_kind(task.name, kind)),
         _ => true,
     }
 }
@@ -137,14 +137,14 @@ impl Args {
     ///
     /// If a task does not exist, or the numbers of seeds are neither one nor one per task.
     pub fn cells(&self) -> anyhow::Result<Vec<Cell>> {
-        let mut tasks: Vec<&'static dyn AnyTask> = Vec::new();
+        let mut tasks: Vec<&'static AnyTask> = Vec::new();
         for name in &self.tasks {
             match name.as_str() {
                 "all" => tasks.extend(TASKS),
                 name => tasks.push(task(name)?),
             }
         }
-        tasks.dedup_by_key(|task| task.name());
+        tasks.dedup_by_key(|task| task.name);
         anyhow::ensure!(
             self.runs.len() <= 1 || self.runs.len() == tasks.len(),
             "--runs has {} numbers for {} tasks: say one, or one for each",
@@ -155,17 +155,16 @@ impl Args {
         let mut cells = Vec::new();
         for (k, task) in tasks.iter().enumerate() {
             for variant in Variant::ALL {
-                let runs = self.runs_of(k, *task);
-                self.compared(*task, variant, runs, &backends, &mut cells)?;
+                let runs = self.runs_of(k, task);
+                self.compared(task, variant, runs, &backends, &mut cells)?;
             }
         }
         for kind in self.crossed.iter().filter(|kind| !kind.is_empty() && tasks.len() > 1) {
             for (k, task) in tasks.iter().enumerate() {
                 for variant in Variant::ALL {
-                    let runs = self.runs_of(k, *task);
-                    let crossed = tasks
-                        .iter()
-                        .map(|from| self.crossed_cell(*task, variant, runs, *from, kind));
+                    let runs = self.runs_of(k, task);
+                    let crossed =
+                        tasks.iter().map(|from| self.crossed_cell(task, variant, runs, from, kind));
                     cells
                         .extend(crossed.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten());
                 }
@@ -179,7 +178,7 @@ impl Args {
     /// A learned or searched softness is omitted if it is the preset and the preset is compared.
     fn compared(
         &self,
-        task: &'static dyn AnyTask,
+        task: &'static AnyTask,
         variant: Variant,
         runs: u32,
         backends: &[&'static str],
@@ -203,7 +202,7 @@ impl Args {
             let Some(method) = method.as_ref().filter(|method| is_there(task, method)) else {
                 continue;
             };
-            let name_of_task = task.name();
+            let name_of_task = task.name;
             let shown_twice = match is(method, SoftnessChoice::Searched) {
                 true => is_preset(name_of_task, ScheduledSoftness::searched(name_of_task)),
                 false => {
@@ -220,9 +219,9 @@ impl Args {
                 continue;
             };
             let varied = |what: String| format!("{name} {what}");
-            if task.moves_edges() {
+            if task.moves_edges {
                 let usual =
-                    task.entry(&softrast_cli::Common { variant, ..Default::default() }, method)?;
+                    (task.entry)(&softrast_cli::Common { variant, ..Default::default() }, method)?;
                 let side = usual.solve.size / 2;
                 let fewer =
                     MethodArgs { resolution: Some(Resolution::Side(side)), ..method.clone() };
@@ -246,14 +245,14 @@ impl Args {
     /// The cell of the softness learned on `from`, on `task`; none if that is compared anyway or not bundled.
     fn crossed_cell(
         &self,
-        task: &'static dyn AnyTask,
+        task: &'static AnyTask,
         variant: Variant,
         runs: u32,
-        from: &'static dyn AnyTask,
+        from: &'static AnyTask,
         kind: &str,
     ) -> anyhow::Result<Option<Cell>> {
         let name = match kind.strip_prefix("learned") {
-            Some(kind) if from.name() != task.name() => format!("learned-{}{kind}", from.name()),
+            Some(kind) if from.name != task.name => format!("learned-{}{kind}", from.name),
             _ => kind.to_owned(),
         };
         if self.methods.iter().any(|method| method.name == name) {
@@ -263,12 +262,12 @@ impl Args {
         if !is_there(task, &method) {
             return Ok(None);
         }
-        let purpose = Purpose::Crossed(from.name());
+        let purpose = Purpose::Crossed(from.name);
         Ok(Some(Cell { task, variant, method, name, backend: None, runs, purpose }))
     }
 
-    fn runs_of(&self, k: usize, task: &dyn AnyTask) -> u32 {
-        let usual = task.paper().runs[usize::from(self.quick)];
+    fn runs_of(&self, k: usize, task: &AnyTask) -> u32 {
+        let usual = task.paper.runs[usize::from(self.quick)];
         self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual)
     }
 
@@ -285,7 +284,6 @@ impl Args {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use softrast_cli::Entry;
 
     fn args(line: &str) -> Args {
         Args::parse_from(["compare"].into_iter().chain(line.split_whitespace()))
@@ -297,16 +295,17 @@ mod tests {
         // Eleven on every task; where edges move, a surrogate and four variations; on three tasks the learned softness, on one the searched
         // one; then the crossed ones.
         assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + (3 + 1) * 2 + 4 * 2 * 3);
-        assert_eq!((cells[0].task.name(), cells[18].variant), ("shape2d", Variant::Transfer));
+        assert_eq!((cells[0].task.name, cells[18].variant), ("shape2d", Variant::Transfer));
         assert_eq!((&*cells[0].name, &*cells[12].name), ("preset", "preset resolution 128"));
-        assert!(cells[0].is_default() && !cells[12].is_default());
-        let learned =
-            |task: &str| cells.iter().any(|c| c.task.name() == task && c.name == "learned");
+        let preset = MethodArgs { softness: Some(SoftnessChoice::Preset), ..MethodArgs::default() };
+        let is_default = |cell: &Cell| cell.method == preset && cell.purpose == Purpose::Compared;
+        assert!(is_default(&cells[0]) && !is_default(&cells[12]));
+        let learned = |task: &str| cells.iter().any(|c| c.task.name == task && c.name == "learned");
         assert!(learned("shape3d") && learned("pose") && learned("occlusion"));
         assert!(!learned("shape2d"), "what is the preset is not shown twice");
         let searched = cells.iter().filter(|cell| cell.name == "searched");
         assert!(
-            searched.clone().count() == 2 && searched.clone().all(|c| c.task.name() == "shape3d")
+            searched.clone().count() == 2 && searched.clone().all(|c| c.task.name == "shape3d")
         );
         let alone =
             args("--tasks occlusion --methods learned --varied= --crossed=").cells().unwrap();
@@ -328,36 +327,20 @@ mod tests {
     }
 
     /// A task without a bundled softness.
-    struct Disc;
-
-    impl AnyTask for Disc {
-        fn name(&self) -> &'static str {
-            "disc"
-        }
-
-        fn title(&self) -> &'static str {
-            "DISC"
-        }
-
-        fn moves_edges(&self) -> bool {
-            true
-        }
-
-        fn paper(&self) -> &'static softrast_cli::Paper {
-            TASKS[0].paper()
-        }
-
-        fn entry(&self, _: &softrast_cli::Common, _: &MethodArgs) -> anyhow::Result<Entry> {
-            unreachable!("nothing is evaluated")
-        }
-    }
+    static DISC: AnyTask = AnyTask {
+        name: "disc",
+        title: "DISC",
+        moves_edges: true,
+        paper: &softrast_cli::Paper::NONE,
+        entry: |_, _| unreachable!("nothing is evaluated"),
+    };
 
     #[test]
     fn a_new_task_is_compared_by_what_needs_nothing_learned_on_it() {
         let line =
             "--methods preset,learned,learned-mlp,learned-surrogate,gauss,learned-pose --varied=";
         let mut cells = Vec::new();
-        args(line).compared(&Disc, Variant::Original, 1, &[], &mut cells).unwrap();
+        args(line).compared(&DISC, Variant::Original, 1, &[], &mut cells).unwrap();
         let names: Vec<&str> = cells.iter().map(|cell| cell.name.as_str()).collect();
         assert_eq!(names, ["gauss", "learned-pose"]);
     }

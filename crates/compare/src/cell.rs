@@ -1,4 +1,4 @@
-use softrast_cli::{Common, Entry, MethodArgs, SoftnessChoice, Variant};
+use softrast_cli::{Common, Entry, MethodArgs, Variant};
 
 use crate::tasks::AnyTask;
 
@@ -6,7 +6,7 @@ use crate::tasks::AnyTask;
 #[derive(Clone)]
 pub struct Cell {
     /// The task.
-    pub task: &'static dyn AnyTask,
+    pub task: &'static AnyTask,
     /// Original or transfer.
     pub variant: Variant,
     /// The method.
@@ -52,18 +52,11 @@ impl Cell {
     pub fn entry(&self, backend: Option<&str>) -> anyhow::Result<Entry> {
         let backend = self.backend.or(backend).map(str::to_owned);
         let common = Common { variant: self.variant, backend, ..Common::default() };
-        self.task.entry(&common, &self.method)
+        (self.task.entry)(&common, &self.method)
     }
 
     /// Seeds of the cell, from 0 on.
     pub fn seeds(&self) -> Vec<u64> {
         softrast_lab::seeds(0, self.runs as usize)
-    }
-
-    /// Whether the cell is the default of the task's program, without flags.
-    pub fn is_default(&self) -> bool {
-        self.method
-            == MethodArgs { softness: Some(SoftnessChoice::Preset), ..MethodArgs::default() }
-            && self.purpose == Purpose::Compared
     }
 }

@@ -42,10 +42,10 @@ fn chart(group: &[&Record]) -> Chart {
         Axis::logarithmic(&format!("{} of the returned step", group[0].titles[0])),
     );
     Chart {
-        name: format!("{}-{variant}-pareto", task.name()),
+        name: format!("{}-{variant}-pareto", task.name),
         caption: format!(
             "{}, {variant}: error of the returned step against the seconds of a run, a mark for each method",
-            task.title()
+            task.title
         ),
         plot: Plot {
             series: series.collect(),

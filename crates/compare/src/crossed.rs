@@ -13,11 +13,11 @@ pub(crate) fn crossed(records: &[Record]) -> Option<Table> {
     for one in records.iter().filter(|one| !one.compared) {
         rows.extend(one.learned_on.as_ref().filter(|row| !rows.contains(row)));
     }
-    rows.sort_by_key(|[kind, task]| (kind, TASKS.iter().position(|t| t.name() == task)));
+    rows.sort_by_key(|[kind, task]| (kind, TASKS.iter().position(|t| t.name == task)));
     let groups = by_variant(records);
     let columns = groups.iter().map(|group| {
         let one = group[0];
-        format!("{} {}, {}", one.task().title(), one.variant(), one.titles[0])
+        format!("{} {}, {}", one.task().title, one.variant(), one.titles[0])
     });
     let mut table = Table::new(["learned on".to_owned()].into_iter().chain(columns));
     let of = |row: &[String; 2], group: &[&Record]| {
@@ -28,7 +28,7 @@ pub(crate) fn crossed(records: &[Record]) -> Option<Table> {
     let errors: Vec<Vec<_>> =
         rows.iter().map(|row| groups.iter().map(|group| of(row, group)).collect()).collect();
     for ([kind, task], row) in rows.iter().zip(&errors) {
-        let title = TASKS.iter().find(|t| t.name() == task).map_or(&**task, |task| task.title());
+        let title = TASKS.iter().find(|t| t.name == task).map_or(&**task, |task| task.title);
         let called = if kind.is_empty() { title.to_owned() } else { format!("{title}, {kind}") };
         let cells = row.iter().enumerate().map(|(k, error)| {
             let column = errors.iter().filter_map(|row| row[k].map(mean));

@@ -6,8 +6,7 @@ use crate::{Record, TASKS, measured::short};
 
 /// Records per task and variant, in the order of the tables, without those only in Table 6.
 pub(crate) fn by_variant(records: &[Record]) -> Vec<Vec<&Record>> {
-    let places =
-        TASKS.iter().flat_map(|task| [true, false].map(|original| (task.name(), original)));
+    let places = TASKS.iter().flat_map(|task| [true, false].map(|original| (task.name, original)));
     let group = |place| {
         let of = |one: &&Record| one.compared && (one.task.as_str(), one.original) == place;
         records.iter().filter(of).collect::<Vec<_>>()

@@ -147,7 +147,7 @@ impl Measured {
             parameters: parameters.map(|metric| mean_of(metric.key)).collect(),
             faces: self.entry.faces,
         };
-        (self.cell.task.paper().in_its_unit)(&ours)
+        (self.cell.task.paper.in_its_unit)(&ours)
     }
 }
 

@@ -91,7 +91,7 @@ pub fn compare(args: &Args, command: &str, inputs: &Inputs) -> anyhow::Result<Ou
     note.filter(|_| goes_on).iter().for_each(|note| say(note));
     let mut measured = Vec::with_capacity(cells.len());
     for (k, cell) in cells.iter().enumerate() {
-        let (task, variant) = (cell.task.name(), cell.variant.name());
+        let (task, variant) = (cell.task.name, cell.variant.name());
         if !args.quiet {
             let place = format!("cell {} of {}", k + 1, cells.len());
             say(&format!("{place}: {task}, {variant}, {}", cell.name));

@@ -68,7 +68,7 @@ impl Record {
         let title = |place: Option<usize>| place.map(|place| one.title(place)).unwrap_or_default();
         let kept = |values: Vec<f64>| values.into_iter().map(kept).collect();
         Self {
-            task: cell.task.name().to_owned(),
+            task: cell.task.name.to_owned(),
             original: cell.variant == Variant::Original,
             method: cell.name.clone(),
             family: family.to_owned(),
@@ -95,9 +95,9 @@ impl Record {
     /// # Panics
     ///
     /// If no task has this name, which is checked when records are read.
-    pub fn task(&self) -> &'static dyn AnyTask {
-        let task = TASKS.iter().find(|task| task.name() == self.task);
-        *task.unwrap_or_else(|| panic!("there is no task {}", self.task))
+    pub fn task(&self) -> &'static AnyTask {
+        let task = TASKS.iter().find(|task| task.name == self.task);
+        task.unwrap_or_else(|| panic!("there is no task {}", self.task))
     }
 
     /// Name of the variant.
@@ -113,7 +113,7 @@ impl Record {
 
 /// Kind of the bundled softness, and the task that it was learned on.
 fn learned_on(cell: &Cell) -> Option<[String; 2]> {
-    let task = cell.task.name();
+    let task = cell.task.name;
     let kind = match &cell.method.softness {
         Some(SoftnessChoice::Preset) if is_preset_learned(task) => String::new(),
         Some(SoftnessChoice::Learned(kind)) => kind.clone().unwrap_or_default(),
@@ -141,9 +141,9 @@ fn is_chosen(cell: &Cell) -> bool {
     if method.scale.is_some() || method.init.is_some() {
         return true;
     }
-    [Schedule::Static, Schedule::Decay].into_iter().any(|usual| {
-        Searched::of(cell.task.name(), family.name(), method.schedule, usual).is_some()
-    })
+    [Schedule::Static, Schedule::Decay]
+        .into_iter()
+        .any(|usual| Searched::of(cell.task.name, family.name(), method.schedule, usual).is_some())
 }
 
 /// The records as text, one a line.

@@ -40,9 +40,9 @@ pub(crate) fn markdown(
         let (task, variant) = (first.task(), first.variant());
         // Writing to a string does not fail.
         if first.original {
-            let _ = write!(text, "\n### {}\n\n{}\n", task.title(), task.paper().note);
+            let _ = write!(text, "\n### {}\n\n{}\n", task.title, task.paper.note);
         }
-        let errors = table(&format!("errors {} {variant}", task.name()))?;
+        let errors = table(&format!("errors {} {variant}", task.name))?;
         let _ = write!(text, "\n**{variant}**, seeds: {}\n\n{errors}", first.returned.len());
         text += &shown(chart, pictures);
     }
@@ -77,13 +77,13 @@ pub(crate) fn html(
     report.table(&tables::tasks(records));
     for (group, chart) in by_variant(records).iter().zip(charts) {
         let first = group[0];
-        report.heading(&format!("{}, {}", first.task().title(), first.variant()));
-        report.paragraph(first.task().paper().note);
+        report.heading(&format!("{}, {}", first.task().title, first.variant()));
+        report.paragraph(first.task().paper.note);
         report.paragraph(&format!("Seeds: {}", first.returned.len()));
         report.table(&tables::errors(group));
         report.chart(&chart.plot.svg()?, &chart.caption);
         let here = |one: &&Measured| {
-            one.cell.task.name() == first.task && one.cell.variant.name() == first.variant()
+            one.cell.task.name == first.task && one.cell.variant.name() == first.variant()
         };
         for one in measured.iter().filter(here) {
             if let Some(pictures) = &one.pictures {

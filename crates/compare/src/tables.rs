@@ -29,14 +29,14 @@ pub(crate) fn tasks(records: &[Record]) -> Table {
         let hard = one.titles[0].clone();
         let parameter = parameter_title(one).unwrap_or_else(|| "none".to_owned());
         table.push([
-            one.task().title().to_owned(),
+            one.task().title.to_owned(),
             one.variant().to_owned(),
             one.faces.to_string(),
             format!("{0} × {0}", one.size),
             one.steps.to_string(),
             hard,
             parameter,
-            one.task().paper().freedom[usize::from(!one.original)].to_owned(),
+            one.task().paper.freedom[usize::from(!one.original)].to_owned(),
         ]);
     }
     table
@@ -120,8 +120,8 @@ fn paper(records: &[Record]) -> Table {
         Table::new(["task", "variant", "softness", "paper", "ours, static", "ours, decay"]);
     for group in by_variant(records) {
         let first = group[0];
-        for (family, _) in first.task().paper().table3 {
-            let printed = first.task().paper().printed(family, first.original);
+        for (family, _) in first.task().paper.table3 {
+            let printed = first.task().paper.printed(family, first.original);
             let ours = |end: &str| {
                 let of = |one: &&&Record| {
                     !one.varied && one.family == *family && one.method.ends_with(end)
@@ -129,7 +129,7 @@ fn paper(records: &[Record]) -> Table {
                 group.iter().find(of).map_or(String::new(), |one| pair(one.in_papers_unit))
             };
             table.push([
-                first.task().title().to_owned(),
+                first.task().title.to_owned(),
                 first.variant().to_owned(),
                 (*family).to_owned(),
                 printed.map(pair).unwrap_or_default(),
@@ -146,7 +146,7 @@ pub(crate) fn seconds(records: &[Record]) -> Table {
     let mut table = Table::new(["task", "variant", "method", "seconds a run", "ms a step"]);
     for one in by_variant(records).into_iter().flatten().filter(|one| !one.varied) {
         table.push([
-            one.task().title().to_owned(),
+            one.task().title.to_owned(),
             one.variant().to_owned(),
             one.method.clone(),
             short(one.seconds),
@@ -258,7 +258,7 @@ fn parameter_title(one: &Record) -> Option<String> {
 
 /// Name of the task, with its variant unless that is the original.
 fn named_task(one: &Record) -> String {
-    format!("{}{}", one.task().title(), if one.original { "" } else { ", transfer" })
+    format!("{}{}", one.task().title, if one.original { "" } else { ", transfer" })
 }
 
 fn pair(errors: [Option<f64>; 2]) -> String {

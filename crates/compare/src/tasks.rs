@@ -1,65 +1,36 @@
-use std::marker::PhantomData;
+use softrast_cli::{Common, Entry, MethodArgs, Paper, Task, usual_args};
 
-use softrast_cli::{Common, Entry, MethodArgs, Paper, Task};
-
-/// The tasks that are compared, in the order of the tables.
-macro_rules! tasks {
-    ($($task:ty),* $(,)?) => {
-        /// All tasks.
-        pub static TASKS: &[&dyn AnyTask] = &[$(&Of::<$task>(PhantomData)),*];
-    };
-}
-
-tasks! {
-    shape2d::Shape2d,
-    shape3d::Shape3d,
-    pose::Pose,
-    occlusion::Occlusion,
-}
+/// All tasks, in the order of the tables.
+pub static TASKS: &[AnyTask] = &[
+    AnyTask::of::<shape2d::Shape2d>(),
+    AnyTask::of::<shape3d::Shape3d>(),
+    AnyTask::of::<pose::Pose>(),
+    AnyTask::of::<occlusion::Occlusion>(),
+];
 
 /// A task of any type.
-pub trait AnyTask: Sync {
+pub struct AnyTask {
     /// Name of its program.
-    fn name(&self) -> &'static str;
-
+    pub name: &'static str,
     /// Name in the paper.
-    fn title(&self) -> &'static str;
-
+    pub title: &'static str,
     /// Whether edges move. Only then can images be drawn on fewer pixels or less exactly, and only then is a surrogate useful.
-    fn moves_edges(&self) -> bool;
-
+    pub moves_edges: bool,
     /// The paper's data on the task.
-    fn paper(&self) -> &'static Paper;
-
-    /// The task with the method given by flags, all else at its default.
-    ///
-    /// # Errors
-    ///
-    /// If flags contradict each other or a file cannot be used.
-    fn entry(&self, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry>;
+    pub paper: &'static Paper,
+    /// The task with the method given by flags, all else at its default. An error if flags contradict each other or a file cannot be used.
+    pub entry: fn(&Common, &MethodArgs) -> anyhow::Result<Entry>,
 }
 
-struct Of<T>(PhantomData<fn() -> T>);
-
-impl<T: Task> AnyTask for Of<T> {
-    fn name(&self) -> &'static str {
-        T::NAME
-    }
-
-    fn title(&self) -> &'static str {
-        T::TITLE
-    }
-
-    fn moves_edges(&self) -> bool {
-        T::MOVES_EDGES
-    }
-
-    fn paper(&self) -> &'static Paper {
-        T::paper()
-    }
-
-    fn entry(&self, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
-        T::entry(&softrast_cli::usual_args(), common, method)
+impl AnyTask {
+    const fn of<T: Task>() -> Self {
+        Self {
+            name: T::NAME,
+            title: T::TITLE,
+            moves_edges: T::MOVES_EDGES,
+            paper: T::PAPER,
+            entry: |common, method| T::entry(&usual_args(), common, method),
+        }
     }
 }
 
@@ -68,10 +39,10 @@ impl<T: Task> AnyTask for Of<T> {
 /// # Errors
 ///
 /// If no task has this name.
-pub fn task(name: &str) -> anyhow::Result<&'static dyn AnyTask> {
-    let found = TASKS.iter().copied().find(|task| task.name() == name);
+pub fn task(name: &str) -> anyhow::Result<&'static AnyTask> {
+    let found = TASKS.iter().find(|task| task.name == name);
     found.ok_or_else(|| {
-        let known: Vec<&str> = TASKS.iter().map(|task| task.name()).collect();
+        let known: Vec<&str> = TASKS.iter().map(|task| task.name).collect();
         anyhow::anyhow!("there is no task {name:?}: expected {} or all", known.join(", "))
     })
 }

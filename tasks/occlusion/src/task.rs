@@ -126,6 +126,7 @@ fn in_rows<B: RasterBackend>(image: Tensor<B, 3>) -> Tensor<B, 4> {
 impl Task for Occlusion {
     const NAME: &'static str = NAME;
     const TITLE: &'static str = "OCCLUSION";
+    const PAPER: &'static Paper = &PAPER;
     const ABOUT: &'static str = "Finds which of several overlapping quads is in front";
 
     /// Narrow, because edges do not move, and wide edges only blur the image.
@@ -290,9 +291,5 @@ impl Task for Occlusion {
         let caption = "Logarithm of the weight of a depth, over how near it is: 0 on the far plane, 1 on the near one. Only \
                        differences matter.";
         Some((Plot { series: series.into(), ..axes }, caption))
-    }
-
-    fn paper() -> &'static Paper {
-        &PAPER
     }
 }

@@ -133,6 +133,7 @@ impl InverseProblem for Pose {
 impl Task for Pose {
     const NAME: &'static str = "pose";
     const TITLE: &'static str = "POSE";
+    const PAPER: &'static Paper = &PAPER;
     const ABOUT: &'static str = "Recovers the pose of a camera from a silhouette";
 
     /// Wide enough at first to have a gradient from afar, and at last as narrow as the best hard silhouettes allow.
@@ -274,9 +275,5 @@ impl Task for Pose {
             ));
         }
         warnings
-    }
-
-    fn paper() -> &'static Paper {
-        &PAPER
     }
 }

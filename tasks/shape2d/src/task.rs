@@ -102,6 +102,7 @@ impl InverseProblem for Shape2d {
 impl Task for Shape2d {
     const NAME: &'static str = "shape2d";
     const TITLE: &'static str = "2D SHAPE";
+    const PAPER: &'static Paper = &PAPER;
     const ABOUT: &'static str = "Moves loose triangles until they cover a picture";
 
     /// A quarter of a pixel of the default size: triangles lie so densely that few need a gradient from afar.
@@ -187,9 +188,5 @@ impl Task for Shape2d {
 
     fn detail(&self, args: &Args) -> Option<Detail<Args>> {
         args.detail(self.usual_triangles)
-    }
-
-    fn paper() -> &'static Paper {
-        &PAPER
     }
 }

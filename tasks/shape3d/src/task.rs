@@ -119,6 +119,7 @@ impl InverseProblem for Shape3d {
 impl Task for Shape3d {
     const NAME: &'static str = "shape3d";
     const TITLE: &'static str = "3D SHAPE";
+    const PAPER: &'static Paper = &PAPER;
     const ABOUT: &'static str = "Deforms a sphere until it has the silhouettes of a target";
 
     /// Wide enough at first to prevent folding, and narrow at last for accurate hard silhouettes.
@@ -243,10 +244,6 @@ impl Task for Shape3d {
             values: DETAILS.to_vec(),
             set: |args: &mut Args, value| args.detail = Some(value),
         })
-    }
-
-    fn paper() -> &'static Paper {
-        &PAPER
     }
 }
 
