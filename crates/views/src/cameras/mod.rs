@@ -2,6 +2,7 @@
 
 mod calibration;
 mod camera_file;
+mod coefficients;
 mod colmap;
 mod distortion;
 mod fields;
