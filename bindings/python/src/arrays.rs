@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedA
 use pyo3::prelude::*;
 use softrast_raster::low_level::Numbers;
 
-use crate::{guard::refused, store::Store};
+use crate::guard::refused;
 
 /// An array of a call: C-contiguous, borrowed or owned.
 #[derive(Clone)]
@@ -29,19 +29,6 @@ pub(crate) enum Floats<'a> {
     F64(Cow<'a, [f64]>),
     /// A tensor on a device, see [`crate::device::On`].
     Device(Arc<dyn Any + Send + Sync>),
-}
-
-/// An array of which it is known where its numbers lie and of what type they are.
-pub(crate) struct View<'a, S: Store> {
-    pub(crate) dims: Vec<usize>,
-    pub(crate) values: &'a S::Slice,
-}
-
-// Derived, it would ask for numbers that can be cloned.
-impl<S: Store> Clone for View<'_, S> {
-    fn clone(&self) -> Self {
-        Self { dims: self.dims.clone(), values: self.values }
-    }
 }
 
 /// float32 or float64.
@@ -111,7 +98,7 @@ impl Floats<'_> {
     /// These numbers in float64.
     pub(crate) fn wide(&self) -> Result<Vec<f64>, String> {
         match self {
-            Self::F32(values) => Ok(f32::wide(values)),
+            Self::F32(values) => Ok(values.iter().map(|&x| f64::from(x)).collect()),
             Self::F64(values) => Ok(values.to_vec()),
             Self::Device(_) => Err("φ must lie on the CPU".to_owned()),
         }
@@ -120,18 +107,13 @@ impl Floats<'_> {
     /// Numbers rounded to the type of these.
     pub(crate) fn like(&self, values: Vec<f64>) -> Floats<'static> {
         match self {
-            Self::F32(own) => f32::any(f32::narrow(&values, own)),
+            Self::F32(_) => f32::any(values.into_iter().map(|x| x as f32).collect::<Vec<_>>()),
             Self::F64(_) | Self::Device(_) => f64::any(values),
         }
     }
 }
 
-impl<'a> Array<'a> {
-    pub(crate) fn view<S: Store>(&'a self) -> Result<View<'a, S>, String> {
-        let values = S::known(&self.numbers).ok_or(MIXED)?;
-        Ok(View { dims: self.dims.clone(), values })
-    }
-
+impl Array<'_> {
     /// The part `k` of those that have the shape `dims`.
     pub(crate) fn part(&self, dims: Vec<usize>, k: usize) -> Array<'_> {
         let count: usize = dims.iter().product();

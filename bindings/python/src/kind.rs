@@ -5,12 +5,12 @@ use std::{borrow::Borrow, sync::Arc};
 use pyo3::PyResult;
 
 use crate::{
-    arrays::{Array, View},
+    arrays::Array,
     guard::refused,
     losses::Losses,
     op::Op,
     passes::{Blends, Directions, Found, Inputs, MISSING, Silhouettes},
-    store::Store,
+    store::{Store, View},
 };
 
 /// Which derivative of a function.

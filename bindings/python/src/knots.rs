@@ -6,10 +6,10 @@ use std::{
 };
 
 use crate::{
-    arrays::{Array, View, same},
+    arrays::{Array, same},
     guard::caught,
     op::Op,
-    store::Store,
+    store::{Store, View},
     taped::Taped,
 };
 

@@ -11,12 +11,11 @@ use softrast_raster::{
 };
 
 use crate::{
-    arrays::View,
     guard::caught,
     knots::{Drawing, Knots},
     op::{Gradients, Op},
     passes::{Directions, Inputs, MISSING, Silhouettes, Tabled, only},
-    store::Store,
+    store::{Store, View},
     taped::Taped,
 };
 

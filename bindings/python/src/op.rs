@@ -8,7 +8,11 @@ use softrast_raster::{
 };
 use softrast_softness::EdgeSoftness;
 
-use crate::{arrays::View, guard::caught, store::Store, taped::Taped};
+use crate::{
+    guard::caught,
+    store::{Store, View},
+    taped::Taped,
+};
 
 /// A differentiable function of arrays of one float type.
 #[derive(Clone)]

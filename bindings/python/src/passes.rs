@@ -6,12 +6,11 @@ use softrast_raster::{ColourRenderer, HostBackend, SoftRenderer, TConorm};
 use softrast_softness::{EdgeSoftness, Softness as _};
 
 use crate::{
-    arrays::View,
     checks::{check_phi, least},
     guard::caught,
     knots::{Drawing, Drawings, Knots, Recent},
     op::{Gradients, Op},
-    store::Store,
+    store::{Store, View},
     taped::Taped,
 };
 

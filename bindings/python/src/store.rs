@@ -5,7 +5,7 @@ use std::borrow::Borrow;
 use softrast_raster::low_level::{FusedOp, Pass};
 
 use crate::{
-    arrays::{Float, Floats, same},
+    arrays::{Array, Float, Floats, MIXED, same},
     taped::{Taped, numbers, vector},
 };
 
@@ -45,6 +45,26 @@ pub(crate) trait Store: Clone + Send + Sync + 'static {
     fn run(op: &FusedOp, pass: &Pass, inputs: &[&Self::Slice], dims: &[Vec<usize>]) -> Self::Owned;
     /// Runs a pass of a function of one vector. May panic.
     fn run_taped(of: &Taped, pass: &Pass, inputs: &[&Self::Slice]) -> Self::Owned;
+}
+
+/// An array of which it is known where its numbers lie and of what type they are.
+pub(crate) struct View<'a, S: Store> {
+    pub(crate) dims: Vec<usize>,
+    pub(crate) values: &'a S::Slice,
+}
+
+// Derived, it would ask for numbers that can be cloned.
+impl<S: Store> Clone for View<'_, S> {
+    fn clone(&self) -> Self {
+        Self { dims: self.dims.clone(), values: self.values }
+    }
+}
+
+impl<'a> Array<'a> {
+    pub(crate) fn view<S: Store>(&'a self) -> Result<View<'a, S>, String> {
+        let values = S::known(&self.numbers).ok_or(MIXED)?;
+        Ok(View { dims: self.dims.clone(), values })
+    }
 }
 
 impl<F: Float> Store for F {
