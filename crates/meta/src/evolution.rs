@@ -36,7 +36,7 @@ pub(crate) fn evolution<B: Backend>(
 }
 
 /// A standard normal number, by the Box-Muller transform.
-fn normal(random: &mut StdRng) -> f64 {
+pub fn normal(random: &mut StdRng) -> f64 {
     // From (0, 1], where the logarithm is finite.
     let reach = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
     reach * (TAU * random.random::<f64>()).cos()

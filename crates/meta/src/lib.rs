@@ -49,6 +49,8 @@ mod unrolled;
 pub use adam::{Adam, AdamState};
 pub use bilevel_problem::BilevelProblem;
 pub use estimate::MetaEstimate;
+#[doc(hidden)]
+pub use evolution::normal;
 pub use inner_loop::{InnerLoop, descend};
 pub use meta_gradient::MetaGradient;
 pub use objective::Objective;

@@ -1,5 +1,6 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use softrast_mesh::Mesh;
+use softrast_meta::normal;
 use softrast_raster::Orbit;
 
 /// Target and start of one run.
@@ -62,12 +63,6 @@ impl PoseInstance {
         }
         instance
     }
-}
-
-/// A standard normal number, by the Box-Muller transform.
-fn normal(random: &mut StdRng) -> f64 {
-    let [u, v] = [(); 2].map(|()| random.random::<f64>());
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
 /// Finds the orbit camera of a mesh from its target silhouette.
