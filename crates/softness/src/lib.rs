@@ -40,6 +40,8 @@ pub use depth_softness::{DepthSoftness, UnknownDepthSoftness};
 pub use edge::EdgeSoftness;
 pub use family::{Family, UnknownFamily};
 pub use math::OPAQUE;
+#[doc(hidden)]
+pub use math::ln_scale;
 pub use mirrored::Mirrored;
 pub use network::initial_mlp;
 #[cfg(feature = "modules")]

@@ -136,7 +136,7 @@ pub(crate) fn ln_gamma<B: Backend, const D: usize>(p: Tensor<B, D>) -> Tensor<B,
 /// # Panics
 ///
 /// If `scale` is not positive.
-pub(crate) fn ln_scale(scale: f64) -> f64 {
+pub fn ln_scale(scale: f64) -> f64 {
     assert!(scale > 0.0 && scale.is_finite(), "scale {scale} is not positive");
     scale.ln()
 }
