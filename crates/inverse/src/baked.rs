@@ -4,6 +4,8 @@ use anyhow::{Context, ensure};
 use image::{ImageFormat, Rgb, RgbImage};
 use softrast_mesh::{Mesh, Texture};
 
+use crate::cuts::{cuts, parts};
+
 /// Texels that a square's side has in addition to the parts of an edge. A square holds two faces,
 /// corner to corner, and interpolation within one must not read texels of the other.
 const APART: usize = 3;
@@ -31,12 +33,8 @@ const APART: usize = 3;
 /// If `fine` has no colours, or is not the mesh after some subdivisions.
 pub fn baked(mesh: &Mesh, fine: &Mesh) -> anyhow::Result<Mesh> {
     let colours = fine.colours().context("a mesh without colours makes no texture")?;
-    let (faces, parts) = (mesh.faces().len(), fine.faces().len());
-    let cuts = (parts / faces.max(1)).max(1).ilog(4);
-    ensure!(
-        faces > 0 && faces << (2 * cuts) == parts,
-        "a mesh of {parts} faces is not one of {faces} whose faces were cut into four"
-    );
+    let (faces, cuts) = (mesh.faces().len(), cuts(mesh, fine)?);
+    ensure!(faces > 0, "a mesh of 0 faces is not one of 0 whose faces were cut into four");
     let along = 1 << cuts;
     let side = along + APART;
     let squares = faces.div_ceil(2);
@@ -58,9 +56,7 @@ pub fn baked(mesh: &Mesh, fine: &Mesh) -> anyhow::Result<Mesh> {
         let mut texels = vec![[0.0; 3]; (along + 1) * (along + 1)];
         let number = |[i, j]: [usize; 2]| i * (along + 1) + j;
         let corners = [[0, 0], [along, 0], [0, along]];
-        visit(fine, face, cuts, corners, &mut |vertex, at| {
-            texels[number(at)] = colours[vertex as usize];
-        });
+        visit(fine, face, cuts, |vertex, at| texels[number(at)] = colours[vertex as usize]);
         // Beyond the long side, extrapolated for interpolation on that side.
         for i in 1..=along {
             let j = along + 1 - i;
@@ -85,26 +81,14 @@ pub fn baked(mesh: &Mesh, fine: &Mesh) -> anyhow::Result<Mesh> {
     Ok(mesh.clone().with_texture(Texture::new(coordinates, corners)?.with_picture(file)?)?)
 }
 
-/// Calls `tell` with each vertex of the parts of a face after `cuts` subdivisions, and its place in the grid spanned by `[a, b, c]`.
-fn visit(
-    fine: &Mesh,
-    face: usize,
-    cuts: u32,
-    [a, b, c]: [[usize; 2]; 3],
-    tell: &mut impl FnMut(u32, [usize; 2]),
-) {
-    if cuts == 0 {
-        for (vertex, at) in fine.faces()[face].into_iter().zip([a, b, c]) {
-            tell(vertex, at);
+/// Calls `tell` with each vertex of the parts of a face after `cuts` subdivisions, and its place in the grid of texels, where the corners
+/// of the face are (0, 0), (2^cuts, 0) and (0, 2^cuts).
+fn visit(fine: &Mesh, face: usize, cuts: u32, mut tell: impl FnMut(u32, [usize; 2])) {
+    parts(face, cuts, &mut |part, shares| {
+        for (vertex, [_, i, j]) in fine.faces()[part].into_iter().zip(shares) {
+            tell(vertex, [i as usize, j as usize]);
         }
-        return;
-    }
-    let middle = |p: [usize; 2], q: [usize; 2]| [0, 1].map(|k| usize::midpoint(p[k], q[k]));
-    let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-    let parts = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
-    for (k, corners) in parts.into_iter().enumerate() {
-        visit(fine, 4 * face + k, cuts - 1, corners, tell);
-    }
+    });
 }
 
 fn rounded(colour: [f64; 3]) -> Rgb<u8> {
@@ -150,25 +134,19 @@ mod tests {
             let parts = 1usize << cuts;
             for (number, corners) in texture.corners().iter().enumerate() {
                 let [a, b, c] = corners.map(|k| texture.coordinates()[k as usize]);
-                visit(
-                    &fine,
-                    number,
-                    cuts,
-                    [[0, 0], [parts, 0], [0, parts]],
-                    &mut |vertex, [i, j]| {
-                        let [s, t] = [i, j].map(|at| at as f64 / parts as f64);
-                        let at = [0, 1].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]));
-                        let found = read(&picture, at);
-                        let known = fine.colours().unwrap()[vertex as usize];
-                        assert!(
-                            (0..3).all(|k| (found[k] - known[k]).abs() < 0.003),
-                            "{found:?} {known:?}"
-                        );
-                    },
-                );
+                visit(&fine, number, cuts, |vertex, [i, j]| {
+                    let [s, t] = [i, j].map(|at| at as f64 / parts as f64);
+                    let at = [0, 1].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]));
+                    let found = read(&picture, at);
+                    let known = fine.colours().unwrap()[vertex as usize];
+                    assert!(
+                        (0..3).all(|k| (found[k] - known[k]).abs() < 0.003),
+                        "{found:?} {known:?}"
+                    );
+                });
                 // On the long side too, half way between the first two vertices.
                 let mut ends = [[0.0; 3]; 2];
-                visit(&fine, number, cuts, [[0, 0], [parts, 0], [0, parts]], &mut |vertex, at| {
+                visit(&fine, number, cuts, |vertex, at| {
                     let end = [[parts, 0], [parts - 1, 1]].iter().position(|&end| end == at);
                     if let Some(end) = end {
                         ends[end] = fine.colours().unwrap()[vertex as usize];

@@ -71,6 +71,7 @@ compile_error!(
 
 mod baked;
 mod checkpoint;
+mod cuts;
 mod distilled_mlp;
 mod instances;
 mod iterate;

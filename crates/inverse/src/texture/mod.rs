@@ -9,6 +9,7 @@ use softrast_mesh::Mesh;
 use softrast_views::{PaintedView, TexelReads, Unwrapped};
 
 use self::{texels::Texels, unseen::without_unseen};
+use crate::cuts::cuts;
 
 /// Texels a side.
 const SIZES: [usize; 2] = [64, 4096];
@@ -77,13 +78,8 @@ pub fn paint_texture(
     size: Option<usize>,
     told: impl FnMut(usize, f64) -> anyhow::Result<()>,
 ) -> anyhow::Result<FoundTexture> {
-    let (faces, parts) = (mesh.faces().len(), fine.faces().len());
-    let cuts = (parts / faces.max(1)).max(1).ilog(4);
     ensure!(fine.colours().is_some(), "a texture starts from colours of vertices");
-    ensure!(
-        faces << (2 * cuts) == parts,
-        "a mesh of {parts} faces is not one of {faces} whose faces were cut into four"
-    );
+    let cuts = cuts(mesh, fine)?;
     ensure!(!views.is_empty(), "a texture needs a view");
     let [least, most] = SIZES;
     ensure!(
@@ -106,7 +102,7 @@ pub fn paint_texture(
     let reads = TexelReads::new(mesh, &layout, views, FACING)?;
     let seen = reads.sees_face();
     let colours = without_unseen(fine, |part| seen[part >> (2 * cuts)]);
-    let mut texels = Texels::of(&layout, &fine.clone().with_colours(colours)?);
+    let mut texels = Texels::of(&layout, &fine.clone().with_colours(colours)?, cuts);
     let stopped = fit::fit(&reads, &mut texels, told).err();
     texels.fill();
     let charts = layout.charts();

@@ -4,8 +4,9 @@ use std::io::Cursor;
 
 use image::{ImageFormat, Rgb, RgbImage};
 use softrast_mesh::{Mesh, Texture};
-
 use softrast_views::{Unwrapped, covered_texels};
+
+use crate::cuts::parts;
 
 /// Rings of texels around a chart that are read between texels.
 const RINGS: usize = 2;
@@ -21,12 +22,11 @@ pub(super) struct Texels {
 }
 
 impl Texels {
-    /// The colours of the vertices of `fine`, which is the mesh of the layout, cut by [`Mesh::subdivided`] some times. Rings have the mean of the texels beside them.
-    pub(super) fn of(layout: &Unwrapped, fine: &Mesh) -> Self {
+    /// The colours of the vertices of `fine`, which is the mesh of the layout, after this many [cuts](crate::cuts::cuts). Rings have the mean of the texels beside them.
+    pub(super) fn of(layout: &Unwrapped, fine: &Mesh, cuts: u32) -> Self {
         let (size, colours) = (layout.size(), fine.colours().unwrap_or_default());
         let mut texels =
             Self { size, colours: vec![0.0; 3 * size * size], is_read: vec![false; size * size] };
-        let cuts = (fine.faces().len() / layout.corners().len().max(1)).max(1).ilog(4);
         let along = f64::from(1u32 << cuts);
         for (number, &face) in layout.corners().iter().enumerate() {
             parts(number, cuts, &mut |part, shares| {
@@ -121,31 +121,6 @@ fn filled(size: usize, colours: &[f32], weights: &[f32]) -> Vec<f32> {
     colours.iter().enumerate().map(of).collect()
 }
 
-/// Shows the parts of a face that was cut so many times, and the shares of its corners at theirs, times 2^cuts.
-fn parts(face: usize, cuts: u32, show: &mut impl FnMut(usize, [[f64; 3]; 3])) {
-    let along = f64::from(1u32 << cuts);
-    let corners = [[along, 0.0, 0.0], [0.0, along, 0.0], [0.0, 0.0, along]];
-    part(face, cuts, corners, show);
-}
-
-fn part(
-    face: usize,
-    cuts: u32,
-    [a, b, c]: [[f64; 3]; 3],
-    show: &mut impl FnMut(usize, [[f64; 3]; 3]),
-) {
-    if cuts == 0 {
-        return show(face, [a, b, c]);
-    }
-    let middle = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| (p[k] + q[k]) / 2.0);
-    let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-    // The order of `Mesh::subdivided`.
-    let parts = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
-    for (k, corners) in parts.into_iter().enumerate() {
-        part(4 * face + k, cuts - 1, corners, show);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use softrast_mesh::icosphere;
@@ -162,7 +137,7 @@ mod tests {
             let colours = fine.positions().iter().map(colour).collect();
             let fine = fine.with_colours(colours).unwrap();
             let layout = Unwrapped::of(&ball, 200).unwrap();
-            let mut texels = Texels::of(&layout, &fine);
+            let mut texels = Texels::of(&layout, &fine, cuts);
             texels.fill();
             let textured = texels.on(&ball, &layout).unwrap();
             let atlas = Atlas::of(&textured, 1 << 20).0.unwrap();
