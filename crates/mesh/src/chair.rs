@@ -2,9 +2,9 @@
 
 use crate::{
     Mesh,
-    mesh::norm,
     stroke::{Stroke, distance, joined, rounded},
     surface_net::{Grid, surface_net},
+    vectors::norm,
 };
 
 /// A chair that faces -z, with y up.

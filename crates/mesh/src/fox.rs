@@ -2,9 +2,9 @@
 
 use crate::{
     Mesh,
-    mesh::{difference, norm},
     stroke::{Stroke, distance, joined, rounded},
     surface_net::{Grid, surface_net},
+    vectors::{difference, norm},
 };
 
 /// A standing fox that faces -z, with y up.

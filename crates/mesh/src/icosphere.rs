@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::{
     Mesh,
-    mesh::{cross, dot, norm},
+    vectors::{cross, dot, norm},
 };
 
 /// The unit sphere: an icosahedron whose triangles are split in four `subdivisions` times.

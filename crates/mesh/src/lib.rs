@@ -54,6 +54,8 @@ mod stroke;
 mod subdivision;
 mod surface_net;
 mod texture;
+#[doc(hidden)]
+pub mod vectors;
 mod write;
 
 pub use airplane::airplane;

@@ -4,6 +4,7 @@ use crate::{
     Fault, MeshError, Texture,
     error::shown,
     subdivision::{between, quartered},
+    vectors::{cross, difference, norm},
 };
 
 /// Vertices and the triangles between them.
@@ -200,26 +201,6 @@ pub(crate) fn finite(position: [f64; 3]) -> Result<(), Fault> {
         Some(x) => Err(Fault::NotFinite(shown(&format!("{x:?}")))),
         None => Ok(()),
     }
-}
-
-/// `a - b`.
-pub(crate) fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| a[k] - b[k])
-}
-
-/// `a · b`.
-pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// `a × b`.
-pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i])
-}
-
-/// `√(a · a)`.
-pub(crate) fn norm(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use crate::{
     gltf::Node,
-    mesh::{cross, dot},
+    vectors::{cross, dot},
 };
 
 /// `p ↦ linear p + offset`.

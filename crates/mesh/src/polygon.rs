@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::{
     error::Trouble,
-    mesh::{cross, difference},
+    vectors::{cross, difference},
 };
 
 /// Limits of box tests for all polygons of a file together, per corner and in addition to that. Simple outlines take up to about 60 per

@@ -126,7 +126,7 @@ fn triangles(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ClosedSurface, mesh::norm};
+    use crate::{ClosedSurface, vectors::norm};
 
     #[test]
     fn a_solid_is_a_mesh_and_nothing_is_none() {
@@ -155,7 +155,7 @@ mod tests {
         }
         let ball = Mesh::of_solid([[-1.2; 3], [1.2; 3]], 9, |p| norm(p) - 1.0).unwrap();
         for [a, b, c] in ball.triangles() {
-            let outwards = crate::mesh::dot(crate::mesh::cross(a, b), c);
+            let outwards = crate::vectors::dot(crate::vectors::cross(a, b), c);
             assert!(outwards > 0.0, "{outwards}");
         }
     }

@@ -1,6 +1,6 @@
 //! Strokes, the components of the solids of the generators.
 
-use crate::mesh::{difference, dot, norm};
+use crate::vectors::{difference, dot, norm};
 
 /// A tapered stroke with round ends: from a point and radius to a point and radius.
 pub(crate) type Stroke = ([f64; 3], f64, [f64; 3], f64);

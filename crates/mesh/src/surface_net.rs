@@ -1,6 +1,6 @@
 //! Converts a solid, given as a function that is negative inside, to a seamless surface.
 
-use crate::mesh::norm;
+use crate::vectors::norm;
 
 /// Least slope of a field assumed in a Newton step: in flatter fields, as where strokes meet, steps are shorter.
 const FLATTEST: f64 = 0.5;
@@ -137,7 +137,7 @@ fn onto_surface(mut point: [f64; 3], step: f64, field: impl Fn([f64; 3]) -> f64)
 /// Two triangles that cut a quadrilateral along its shorter diagonal.
 fn halves(positions: &[[f64; 3]], [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     let length = |i: u32, j: u32| {
-        norm(crate::mesh::difference(positions[i as usize], positions[j as usize]))
+        norm(crate::vectors::difference(positions[i as usize], positions[j as usize]))
     };
     if length(a, c) <= length(b, d) { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] }
 }
@@ -155,7 +155,7 @@ fn moved(mut corner: [usize; 3], axis: usize, by: isize) -> [usize; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{cross, dot};
+    use crate::vectors::{cross, dot};
 
     #[test]
     fn net_of_a_ball_is_a_sphere_that_looks_outward() {

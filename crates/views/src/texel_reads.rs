@@ -2,7 +2,10 @@
 
 use anyhow::ensure;
 use rayon::prelude::*;
-use softrast_mesh::Mesh;
+use softrast_mesh::{
+    Mesh,
+    vectors::{cross, difference, dot},
+};
 use softrast_raster::Pinhole;
 
 use crate::{PaintedView, Unwrapped, nearest_samples};
@@ -233,10 +236,8 @@ impl Sample {
 /// Cosines between faces and the directions from them to a camera; 0 where it sees them from behind.
 fn cosines(mesh: &Mesh, camera: &Pinhole) -> Vec<f32> {
     let eye = camera.eye();
-    let dot = |p: [f64; 3], q: [f64; 3]| (0..3).map(|k| p[k] * q[k]).sum::<f64>();
     let of = |[a, b, c]: [[f64; 3]; 3]| {
-        let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
-        let n = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| u[i] * v[j] - u[j] * v[i]);
+        let n = cross(difference(b, a), difference(c, a));
         let to = [0, 1, 2].map(|k| eye[k] - (a[k] + b[k] + c[k]) / 3.0);
         let lengths = (dot(n, n) * dot(to, to)).sqrt();
         if lengths > 0.0 { (dot(n, to) / lengths).max(0.0) as f32 } else { 0.0 }

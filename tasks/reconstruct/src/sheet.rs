@@ -2,13 +2,10 @@
 
 use image::{Rgb, RgbImage, imageops};
 use softrast_lab::contact_sheet;
+use softrast_mesh::vectors::{cross, difference, dot, norm};
 use softrast_tensor::Backend;
 
-use crate::{
-    Network, SIZE, Shapes, Template, VIEWS, score,
-    solid::{dot, norm},
-    view,
-};
+use crate::{Network, SIZE, Shapes, Template, VIEWS, score, view};
 
 /// Small pictures are enlarged by this factor.
 const ENLARGED: u32 = 2;
@@ -116,12 +113,4 @@ pub(crate) fn drawn(vertices: &[[f64; 3]], faces: &[[u32; 3]], view: usize) -> R
         }
     }
     image
-}
-
-fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| a[k] - b[k])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i])
 }

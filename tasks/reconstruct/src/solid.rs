@@ -1,5 +1,7 @@
 //! Solids made of a few simple parts, for the shapes of the procedural set.
 
+use softrast_mesh::vectors::{dot, norm};
+
 /// A simple solid, in world units.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Part {
@@ -91,14 +93,6 @@ fn outside<const N: usize>(beyond: &[f64; N]) -> f64 {
     let inside = beyond.iter().copied().fold(f64::NEG_INFINITY, f64::max).min(0.0);
     let square: f64 = beyond.iter().map(|x| x.max(0.0).powi(2)).sum();
     square.sqrt() + inside
-}
-
-pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(crate) fn norm(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }
 
 #[cfg(test)]

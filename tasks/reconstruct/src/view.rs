@@ -1,7 +1,9 @@
 //! Pictures of solids by ray casting, without the rasterizer: training data must not depend on the
 //! renderer in training.
 
-use crate::solid::{Part, Solid, dot, norm};
+use softrast_mesh::vectors::{dot, norm};
+
+use crate::solid::{Part, Solid};
 
 /// Width and height of the pictures in pixels.
 pub const SIZE: usize = 64;

@@ -1,6 +1,6 @@
 use std::borrow::Cow;
 
-use softrast_mesh::Mesh;
+use softrast_mesh::{Mesh, vectors::product};
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, Projected, hard_silhouette, iou_loss, project, vertex_tensor,
 };
@@ -130,7 +130,7 @@ impl<'a> Look<'a> {
         let ray = self.ray(target.middle);
         let depth = 2.0 * self.radius * self.camera.focal[0] / self.white;
         let towards = turned_to(ray);
-        let placed = rotations.iter().map(|&local| self.place(times(towards, local), ray, depth));
+        let placed = rotations.iter().map(|&local| self.place(product(towards, local), ray, depth));
         let mut cameras: Vec<Pinhole> = placed.collect();
         let mut losses = Vec::new();
         // Two moves; the second is nearly exact.
@@ -172,8 +172,10 @@ impl<'a> Look<'a> {
         let reach = 1.05 * self.radius * self.camera.focal[0].max(self.camera.focal[1]) / across;
         let middle = [left + extent / 2.0, top + extent / 2.0];
         let around = [middle[0] - reach, middle[1] - reach, 2.0 * reach];
-        let placed: Vec<Pinhole> =
-            rotations.iter().map(|&local| self.place(times(towards, local), ray, depth)).collect();
+        let placed: Vec<Pinhole> = rotations
+            .iter()
+            .map(|&local| self.place(product(towards, local), ray, depth))
+            .collect();
         let (drawn, _) = self.drawn(&placed, around, Stencil::SIDE);
         let drawn = numbers(drawn);
         // Window cells per stencil cell.
@@ -188,7 +190,7 @@ impl<'a> Look<'a> {
                 let (at, overlap) = window.best(&stencil)?;
                 (depth >= NEAREST * self.radius).then(|| {
                     let ray = self.ray(at);
-                    (self.place(times(turned_to(ray), local), ray, depth), overlap)
+                    (self.place(product(turned_to(ray), local), ray, depth), overlap)
                 })
             });
             let mut fits: Vec<(Pinhole, f64)> = fits.collect();
@@ -248,10 +250,6 @@ fn turned_to([x, y]: [f64; 2]) -> [[f64; 3]; 3] {
     [[1.0 - h * x * x, -h * x * y, x], [-h * x * y, 1.0 - h * y * y, y], [-x, -y, z]]
 }
 
-fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    a.map(|row| [0, 1, 2].map(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -279,9 +277,9 @@ mod tests {
         // Arbitrary angles.
         for k in 0..200u32 {
             let [x, y] = [0.7 * f64::from(k), 1.3 * f64::from(k)].map(|a| a.sin() * 2.0);
-            let pose = times(
+            let pose = product(
                 turned_to([x, y]),
-                times(all[37 * k as usize % all.len()], turned_to([y, -x])),
+                product(all[37 * k as usize % all.len()], turned_to([y, -x])),
             );
             let nearest = all.iter().map(|&r| angle_deg(pose, r));
             assert!(nearest.fold(f64::INFINITY, f64::min) < 20.0);

@@ -1,7 +1,10 @@
 use std::sync::Arc;
 
 use anyhow::Context;
-use softrast_mesh::Mesh;
+use softrast_mesh::{
+    Mesh,
+    vectors::{cross, dot, norm},
+};
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, Projected, RasterBackend, hard_silhouette, project,
     rotate_by_tangent, vertex_tensor,
@@ -312,10 +315,9 @@ impl MaskScene<HostBackend> {
 
 /// A rotation, orthonormalized against rounding in f32.
 fn orthonormal([x, y, _]: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
-    let unit = |a: [f64; 3]| a.map(|value| value / dot(a, a).sqrt());
+    let unit = |a: [f64; 3]| a.map(|value| value / norm(a));
     let x = unit(x);
     let along = dot(x, y);
     let y = unit([0, 1, 2].map(|k| y[k] - along * x[k]));
-    [x, y, [(1, 2), (2, 0), (0, 1)].map(|(i, j)| x[i] * y[j] - x[j] * y[i])]
+    [x, y, cross(x, y)]
 }

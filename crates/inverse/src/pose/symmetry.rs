@@ -1,4 +1,7 @@
-use softrast_mesh::Mesh;
+use softrast_mesh::{
+    Mesh,
+    vectors::{cross, dot, norm, product},
+};
 use softrast_views::bounding_ball;
 
 use super::search::{DUPLICATE_IOU, coarse, from_three_sides, overlap};
@@ -38,7 +41,7 @@ pub fn symmetries(mesh: &Mesh) -> Vec<Symmetry> {
     let mut axes = identity.to_vec();
     let (middle, of_inertia) = inertia(mesh);
     let away = |p: &[f64; 3]| [0, 1, 2].map(|k| p[k] - middle[k]);
-    let radius = mesh.positions().iter().map(|p| dot(away(p), away(p)).sqrt()).fold(0.0, f64::max);
+    let radius = mesh.positions().iter().map(|p| norm(away(p))).fold(0.0, f64::max);
     for axis in of_inertia {
         if axes.iter().all(|known| dot(*known, axis).abs() < SAME_AXIS) {
             axes.push(axis);
@@ -62,21 +65,9 @@ pub fn symmetries(mesh: &Mesh) -> Vec<Symmetry> {
     found.collect()
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|k| a[k] * b[k]).sum()
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 fn unit(a: [f64; 3]) -> [f64; 3] {
-    let length = dot(a, a).sqrt();
+    let length = norm(a);
     a.map(|x| x / length)
-}
-
-fn product(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    a.map(|row| [0, 1, 2].map(|k| (0..3).map(|j| row[j] * b[j][k]).sum()))
 }
 
 /// The rotation by an angle about an axis of length 1 (Rodrigues).
@@ -112,7 +103,7 @@ fn inertia(mesh: &Mesh) -> ([f64; 3], Vec<[f64; 3]>) {
         let [a, b, c] = face.map(|vertex| place(positions[vertex as usize]));
         let side = |to: [f64; 3]| [0, 1, 2].map(|k| to[k] - a[k]);
         let normal = cross(side(b), side(c));
-        (dot(normal, normal).sqrt(), [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0))
+        (norm(normal), [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0))
     });
     let middles: Vec<(f64, [f64; 3])> = middles.collect();
     let area: f64 = middles.iter().map(|(area, _)| area).sum();

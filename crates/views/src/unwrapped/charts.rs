@@ -2,7 +2,10 @@
 
 use std::collections::{HashMap, HashSet, VecDeque};
 
-use softrast_mesh::Mesh;
+use softrast_mesh::{
+    Mesh,
+    vectors::{cross, difference, norm},
+};
 
 /// Rounds in which normals are averaged with those of neighbours before an axis is chosen, so that roughness does not break charts.
 const ROUNDS: usize = 8;
@@ -25,7 +28,7 @@ pub(super) fn charts(mesh: &Mesh, unit: f64) -> Vec<Chart> {
     let normals: Vec<[f64; 3]> = triangles.iter().map(normal).collect();
     let beside = neighbours(mesh.faces());
     let mut axes = axes(&normals, &beside);
-    let all: f64 = normals.iter().map(length).sum();
+    let all: f64 = normals.iter().copied().map(norm).sum();
     for _ in 0..GIVEN {
         give_small(&mut axes, &normals, &beside, SMALL * all);
     }
@@ -44,13 +47,8 @@ pub(super) fn charts(mesh: &Mesh, unit: f64) -> Vec<Chart> {
 }
 
 /// Twice the area of a triangle, along its normal.
-fn normal([a, b, c]: &[[f64; 3]; 3]) -> [f64; 3] {
-    let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| u[i] * v[j] - u[j] * v[i])
-}
-
-fn length(v: &[f64; 3]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+fn normal(&[a, b, c]: &[[f64; 3]; 3]) -> [f64; 3] {
+    cross(difference(b, a), difference(c, a))
 }
 
 /// The faces beyond the edges of each face, where no more than two share one.
@@ -75,7 +73,7 @@ fn neighbours(faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
 
 /// The cosine of a normal to one of six axes: x, y and z, then their opposites. 1 for a face without an area, which lies flat along any.
 fn cosine(normal: &[f64; 3], axis: u8) -> f64 {
-    let (k, length) = (usize::from(axis % 3), length(normal));
+    let (k, length) = (usize::from(axis % 3), norm(*normal));
     let towards = if axis < 3 { normal[k] } else { -normal[k] };
     if length > 0.0 { towards / length } else { 1.0 }
 }
@@ -129,7 +127,7 @@ fn parts(axes: &[u8], beside: &[Vec<u32>]) -> Vec<Vec<usize>> {
 /// Gives parts of less than this area, doubled, the axis of a neighbour.
 fn give_small(axes: &mut [u8], normals: &[[f64; 3]], beside: &[Vec<u32>], least: f64) {
     for part in parts(axes, beside) {
-        if part.iter().map(|&face| length(&normals[face])).sum::<f64>() >= least {
+        if part.iter().map(|&face| norm(normals[face])).sum::<f64>() >= least {
             continue;
         }
         let own = axes[part[0]];
