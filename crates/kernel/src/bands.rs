@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use self::face_reach::{ReachOfFaces, reach_of_faces};
 use super::{
-    float::Vectors,
-    lanes::{GROUP, on_vectors},
+    float::{Vectors, on_vectors},
+    lanes::GROUP,
     reach::{Reach, in_pixels},
     tasks::{filled, task},
 };

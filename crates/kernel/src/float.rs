@@ -11,6 +11,23 @@ pub(crate) use super::lanes::{Float, Vectors};
 #[cfg(not(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128"))))]
 type F32x8 = Plain<f32>;
 
+/// A call of a function that is generic over vectors: those of this machine for a float type `F`, or arrays if it has none.
+macro_rules! on_vectors {
+    ($function:ident::<Dual<$float:ident>>($($argument:expr),*)) => {
+        match $crate::lanes::has_vectors() {
+            true => $function::<Dual<$float::Best>>($($argument),*),
+            false => $function::<Dual<$crate::lanes::Plain<$float>>>($($argument),*),
+        }
+    };
+    ($function:ident::<$float:ident>($($argument:expr),*)) => {
+        match $crate::lanes::has_vectors() {
+            true => $function::<$float::Best>($($argument),*),
+            false => $function::<$crate::lanes::Plain<$float>>($($argument),*),
+        }
+    };
+}
+pub(crate) use on_vectors;
+
 macro_rules! float {
     ($float:ty, $bits:ty, $mantissa:expr, $bias:expr, $best:ty, $exp:path, $power:path) => {
         impl Vectors for $float {

@@ -305,23 +305,6 @@ pub(crate) fn has_vectors() -> bool {
     has_them && !PORTABLE.load(Ordering::Relaxed)
 }
 
-/// A call of a function that is generic over vectors: those of this machine for a float type `F`, or arrays if it has none.
-macro_rules! on_vectors {
-    ($function:ident::<Dual<$float:ident>>($($argument:expr),*)) => {
-        match $crate::lanes::has_vectors() {
-            true => $function::<Dual<$float::Best>>($($argument),*),
-            false => $function::<Dual<$crate::lanes::Plain<$float>>>($($argument),*),
-        }
-    };
-    ($function:ident::<$float:ident>($($argument:expr),*)) => {
-        match $crate::lanes::has_vectors() {
-            true => $function::<$float::Best>($($argument),*),
-            false => $function::<$crate::lanes::Plain<$float>>($($argument),*),
-        }
-    };
-}
-pub(crate) use on_vectors;
-
 /// Rows of a table, one for each lane.
 #[derive(Clone, Copy)]
 pub(crate) struct Places {

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 
 use super::{
     bands::{Bands, Drawn, View},
-    float::{Float, Vectors},
+    float::{Float, Vectors, on_vectors},
     gather::{Part, gather as gather_corners},
-    lanes::{self, on_vectors},
+    lanes,
     reach::{Reach, within},
     real::{self, Dual, Real, Table},
     scene::{BandRef, Scene},

@@ -82,8 +82,8 @@ pub use self::{
 };
 use super::{
     bands::View,
-    float::{self, Vectors},
-    lanes::{Lanes, on_vectors, run},
+    float::{self, Vectors, on_vectors},
+    lanes::{Lanes, run},
     real::{Dual, Float, Real},
     tasks::task,
 };

@@ -13,9 +13,9 @@ pub use self::pixel::{EMPTY, PixelLoss};
 use super::{
     bands::{Bands, View, bands_of_view},
     face::Face,
-    float::{Float as _, Vectors},
+    float::{Float as _, Vectors, on_vectors},
     gather::{Part, gather as gather_corners},
-    lanes::{LANES, Lanes, Work, on_vectors, run},
+    lanes::{LANES, Lanes, Work, run},
     list::{LISTED, List, group},
     pair::CornerSums,
     real::splat,
