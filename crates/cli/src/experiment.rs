@@ -1,7 +1,7 @@
 use std::rc::Rc;
 
 use serde_json::{Map, Value, json};
-use softrast_inverse::{Iterate, Method, Minimization, Resolution, SolveConfig, Surrogate};
+use softrast_inverse::{Method, Minimization, Resolution, SolveConfig, Surrogate};
 use softrast_lab::{Batch, Error, Experiment, Metric, Pictures, Point, Progress, Run, best_point};
 use softrast_raster::{BackendChoice, HostBackend, RasterBackend, on_backend};
 use softrast_softness::Softness;
@@ -168,7 +168,11 @@ impl<T: Task> TaskExperiment<T> {
         progress: &mut Progress,
     ) -> anyhow::Result<Vec<Solved>> {
         let mut all: Vec<Solved> = Vec::new();
-        let mut watch = |iterate: &Iterate, scene: &T::Scene<HostBackend>| {
+        let given = instances.to_vec();
+        let run = Minimization::<T, B, &T>::new(&self.task, given, &self.method, &self.solve)?;
+        let mut run = if batch.pictures { run.with_pictures() } else { run };
+        while let Some(iterate) = run.next().transpose()? {
+            let scene = run.scene();
             if all.is_empty() {
                 let targets = self.task.targets(scene);
                 let target = targets.chunks(targets.len() / instances.len());
@@ -177,7 +181,7 @@ impl<T: Task> TaskExperiment<T> {
                 all = target.map(solved).collect();
             }
             let thetas = theta_of(&iterate.theta, instances.len());
-            let errors = self.task.errors(instances, scene, iterate);
+            let errors = self.task.errors(instances, scene, &iterate);
             assert_eq!(
                 errors.len(),
                 instances.len(),
@@ -200,13 +204,9 @@ impl<T: Task> TaskExperiment<T> {
                 self.keep_picture(&mut all[0], scene, image, frame);
             }
             let loss = iterate.loss.iter().sum::<f64>() / iterate.loss.len() as f64;
-            if iterate.step == 0 { Ok(()) } else { progress.step(iterate.step, loss) }
-        };
-        let instances = instances.to_vec();
-        let run = Minimization::<T, B, &T>::new(&self.task, instances, &self.method, &self.solve)?;
-        let mut run = if batch.pictures { run.with_pictures() } else { run };
-        while let Some(iterate) = run.next().transpose()? {
-            watch(&iterate, run.scene())?;
+            if iterate.step > 0 {
+                progress.step(iterate.step, loss)?;
+            }
         }
         Ok(all)
     }
@@ -240,9 +240,9 @@ impl<T: Task> TaskExperiment<T> {
     }
 
     fn run_of(&self, seed: u64, instance: &T::Instance, solved: Solved) -> Run {
+        let hard = solved.hard();
         let Solved { run, target, theta } = solved;
         let returned = best_point(&run.curve, HARD);
-        let hard = returned.map_or(f64::INFINITY, |point| point.values[HARD]);
         let success = returned.is_some_and(|point| {
             let errors = [&[point.values[PARAMETER]], &point.values[HARD + 1..]].concat();
             self.task.is_success(hard, &errors)
