@@ -5,7 +5,7 @@ mod prepared;
 use std::sync::Arc;
 
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
-use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
+use softrast_tensor::{Backend, Tensor, tensor_on, vector};
 
 pub use self::prepared::WeightTables;
 use self::{op::Call, prepared::Prepared};
@@ -234,11 +234,10 @@ impl<S: Softness> ColourRenderer<S> {
         let phi = vector::<HostBackend>(&self.phi[1]);
         let far = self.weighting.depth.log_weight(phi, vector::<HostBackend>(&[0.0]));
         let log_weight = f64::from(far.into_scalar()) + BEHIND.ln();
-        let tensor = |values: Vec<f64>| {
-            let data = TensorData::new(values.clone(), [values.len()]);
-            Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
-        };
-        Background { colour: tensor(colour.to_vec()), log_weight: tensor(vec![log_weight]) }
+        Background {
+            colour: tensor_on(colour.to_vec(), [colour.len()], device),
+            log_weight: tensor_on(vec![log_weight], [1], device),
+        }
     }
 
     /// Blended channels and, last, the share of the faces: `[views, channels + 1, height, width]`, top row first.

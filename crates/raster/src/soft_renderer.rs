@@ -4,7 +4,7 @@ mod losses;
 use std::sync::Arc;
 
 use softrast_softness::Softness;
-use softrast_tensor::{Backend, Element, Tensor, TensorData};
+use softrast_tensor::{Backend, Element, Tensor, tensor_on};
 
 use self::knots::Knots;
 pub(crate) use self::knots::stretch;
@@ -200,8 +200,7 @@ impl<S: Softness> SoftRenderer<S> {
 
     /// The parameters as a tensor to optimise, for [`silhouette_with`](Self::silhouette_with).
     pub fn phi_tensor<B: Backend>(&self, device: &B::Device) -> Tensor<B, 1> {
-        let data = TensorData::new(self.phi.clone(), [self.phi.len()]);
-        Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
+        tensor_on(self.phi.clone(), [self.phi.len()], device)
     }
 
     /// The largest error of a pixel with the renderer's own parameters, in coverage: the tolerance, or more if the softness has a jump or a

@@ -9,7 +9,11 @@ use softrast_kernel::{
 };
 use softrast_tensor::{Element, TensorData};
 
-use crate::{ImageSize, NEAR, ops::pass::Pass, weighting::FARTHEST_SEEN};
+use crate::{
+    ImageSize, NEAR,
+    ops::{elementary::flat, pass::Pass},
+    weighting::FARTHEST_SEEN,
+};
 
 /// Constants of the op over its calls: faces, image size, the layout of the tables, and the tolerance of culling.
 #[derive(Clone, Debug)]
@@ -107,7 +111,6 @@ impl SoftBlend {
                 F::blend_vjp_of_vjp(&inputs, kept, upstream, direction, five(along), wanted)
             }
         };
-        let length = values.len();
-        TensorData::new(values, [length])
+        flat(values)
     }
 }

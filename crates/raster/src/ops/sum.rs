@@ -3,7 +3,10 @@ use std::sync::{Arc, OnceLock};
 use softrast_kernel::{Bands, Grid, Inputs, Kernels, bands_of_view};
 use softrast_tensor::{Element, TensorData};
 
-use crate::{ImageSize, ops::pass::Pass};
+use crate::{
+    ImageSize,
+    ops::{elementary::flat, pass::Pass},
+};
 
 /// Constants of the op over its calls: faces, image size and the layout of the table.
 ///
@@ -78,7 +81,6 @@ impl ProfileSum {
                 F::sums_vjp_of_vjp(&inputs, bands, slices[2], slices[3], along, wanted)
             }
         };
-        let length = values.len();
-        TensorData::new(values, [length])
+        flat(values)
     }
 }
