@@ -1,7 +1,8 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use softrast_raster::{
-    ColourRenderer, Projected, RasterBackend, SoftRenderer, Weighting, low_level::Rasterizer,
+    ColourRenderer, Projected, RasterBackend, SoftRenderer, Weighting,
+    low_level::{PixelLoss, Rasterizer},
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Softness};
 use softrast_tensor::{Tensor, numbers, vector};
@@ -207,7 +208,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         }
         let (target, counted) = targets.at(self.side());
         let renderer = self.renderer.silhouettes::<B>(self.progress);
-        renderer.weighted_iou_loss(vertices, target, counted)
+        renderer.weighted_loss(PixelLoss::Iou, vertices, target, counted)
     }
 
     /// The [`Targets::mse_loss`] `[views]` of the silhouette, as one op as for `iou_loss`.
@@ -221,7 +222,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         }
         let (target, counted) = targets.at(self.side());
         let renderer = self.renderer.silhouettes::<B>(self.progress);
-        renderer.weighted_mse_loss(vertices, target, counted)
+        renderer.weighted_loss(PixelLoss::SquaredError, vertices, target, counted)
     }
 
     /// Pixels a side of the image.

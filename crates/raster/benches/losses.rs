@@ -12,7 +12,11 @@ mod workload;
 
 use std::time::Instant;
 
-use softrast_raster::{iou_loss, low_level::Rasterizer, mse_loss, project};
+use softrast_raster::{
+    iou_loss,
+    low_level::{PixelLoss, Rasterizer},
+    mse_loss, project,
+};
 use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 use workload::{Workload, disk, tensor};
 
@@ -41,9 +45,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let vertices = project(world.clone(), Tensor::from_inner(cameras.clone())).tensor();
             let table = Tensor::<A, 2>::from_inner(table.clone());
             let target = Tensor::from_inner(target.clone());
+            let kind = if iou { PixelLoss::Iou } else { PixelLoss::SquaredError };
             let loss = match (together, iou) {
-                (true, false) => silhouette.mse_loss_by_table(vertices, table, target, None),
-                (true, true) => silhouette.iou_loss_by_table(vertices, table, target, None),
+                (true, _) => silhouette.loss_by_table(kind, vertices, table, target, None),
                 (false, false) => mse_loss(silhouette.coverage_by_table(vertices, table), target),
                 (false, true) => iou_loss(silhouette.coverage_by_table(vertices, table), target),
             };

@@ -23,7 +23,11 @@ use std::{
 
 use coloured::Coloured;
 use softrast_kernel::recorded_tasks;
-use softrast_raster::{ColourRenderer, low_level::Rasterizer, project};
+use softrast_raster::{
+    ColourRenderer,
+    low_level::{PixelLoss, Rasterizer},
+    project,
+};
 use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 use workload::{Workload, disk, tensor};
 
@@ -72,7 +76,7 @@ fn recorded(workload: &Workload) -> Vec<Recorded> {
         let vertices = project(world.clone(), Tensor::from_inner(cameras.clone())).tensor();
         let (table, target) =
             (Tensor::from_inner(table.clone()), Tensor::from_inner(target.clone()));
-        let loss = silhouette.mse_loss_by_table(vertices, table, target, None);
+        let loss = silhouette.loss_by_table(PixelLoss::SquaredError, vertices, table, target, None);
         black_box(world.grad(&loss.mean().backward()).expect("the loss depends on the vertices"));
     })
 }

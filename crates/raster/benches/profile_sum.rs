@@ -30,7 +30,7 @@ use rayon::ThreadPool;
 use record::Record;
 use scalar::Scalar;
 use softrast_raster::{
-    low_level::{Rasterizer, Silhouette},
+    low_level::{PixelLoss, Rasterizer, Silhouette},
     project,
 };
 use softrast_softness::{EdgeSoftness, Family};
@@ -335,7 +335,8 @@ impl Step {
         let world = Tensor::<A, 3>::from_inner(self.world.clone()).require_grad();
         let vertices = project(world.clone(), Tensor::from_inner(self.cameras.clone())).tensor();
         let (table, target) = (Tensor::from_inner(table), Tensor::from_inner(self.target.clone()));
-        let loss = self.op.silhouette.mse_loss_by_table(vertices, table, target, None).mean();
+        let mse = PixelLoss::SquaredError;
+        let loss = self.op.silhouette.loss_by_table(mse, vertices, table, target, None).mean();
         backward((loss, world))
     }
 }

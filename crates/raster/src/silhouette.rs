@@ -145,39 +145,14 @@ impl<S: Softness> Silhouette<S> {
         covered(self.profile.t_conorm(), self.sums(vertices, table))
     }
 
-    /// The [`mse_loss`](crate::mse_loss) of each view of [`Silhouette::coverage_by_table`] relative to a target
-    /// `[1 or views, height, width]`, `[views]`. The coverage is multiplied by `counted` (shaped like a target) if given. On the CPU with
-    /// the probabilistic sum it is one op. Gradients reach only the vertices, to second order.
+    /// The loss of each view of [`Silhouette::coverage_by_table`] relative to a target `[1 or views, height, width]`, `[views]`:
+    /// [`mse_loss`](crate::mse_loss) or [`iou_loss`](crate::iou_loss). The coverage is multiplied by `counted` (shaped like a target) if
+    /// given. On the CPU with the probabilistic sum it is one op. Gradients reach only the vertices, to second order.
     ///
     /// # Panics
     ///
     /// If shapes or float types do not fit.
-    pub fn mse_loss_by_table<B: RasterBackend>(
-        &self,
-        vertices: Tensor<B, 3>,
-        table: Tensor<B, 2>,
-        target: Tensor<B, 3>,
-        counted: Option<Tensor<B, 3>>,
-    ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::SquaredError, vertices, table, target, counted)
-    }
-
-    /// The [`iou_loss`](crate::iou_loss) of each view; arguments are those of [`Silhouette::mse_loss_by_table`].
-    ///
-    /// # Panics
-    ///
-    /// If shapes or float types do not fit.
-    pub fn iou_loss_by_table<B: RasterBackend>(
-        &self,
-        vertices: Tensor<B, 3>,
-        table: Tensor<B, 2>,
-        target: Tensor<B, 3>,
-        counted: Option<Tensor<B, 3>>,
-    ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::Iou, vertices, table, target, counted)
-    }
-
-    pub(crate) fn loss<B: RasterBackend>(
+    pub fn loss_by_table<B: RasterBackend>(
         &self,
         loss: PixelLoss,
         vertices: Tensor<B, 3>,

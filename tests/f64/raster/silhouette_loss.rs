@@ -1,7 +1,11 @@
 //! The fused loss of silhouettes is that of the silhouette, and so are its derivatives.
 
 use proptest::prelude::*;
-use softrast_raster::{Projected, SoftRenderer, iou_loss, low_level::Silhouette, mse_loss};
+use softrast_raster::{
+    Projected, SoftRenderer, iou_loss,
+    low_level::{PixelLoss, Silhouette},
+    mse_loss,
+};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
@@ -23,7 +27,7 @@ const LOSSES: [[Loss; 2]; 2] = [
             None => renderer.mse_loss(Projected::new(vertices), target),
             Some(_) => {
                 let (silhouette, table) = by_table(renderer);
-                silhouette.mse_loss_by_table(vertices, table, target, counted)
+                silhouette.loss_by_table(PixelLoss::SquaredError, vertices, table, target, counted)
             }
         },
         |renderer, vertices, target, counted| mse_loss(part(renderer, vertices, counted), target),
@@ -33,7 +37,7 @@ const LOSSES: [[Loss; 2]; 2] = [
             None => renderer.iou_loss(Projected::new(vertices), target),
             Some(_) => {
                 let (silhouette, table) = by_table(renderer);
-                silhouette.iou_loss_by_table(vertices, table, target, counted)
+                silhouette.loss_by_table(PixelLoss::Iou, vertices, table, target, counted)
             }
         },
         |renderer, vertices, target, counted| iou_loss(part(renderer, vertices, counted), target),

@@ -20,7 +20,7 @@ impl<S: Softness> SoftRenderer<S> {
         vertices: Projected<B>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::SquaredError, vertices, target, None)
+        self.weighted_loss(PixelLoss::SquaredError, vertices, target, None)
     }
 
     /// The [`iou_loss`](crate::iou_loss) of each view; see [`mse_loss`](Self::mse_loss).
@@ -33,14 +33,14 @@ impl<S: Softness> SoftRenderer<S> {
         vertices: Projected<B>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::Iou, vertices, target, None)
+        self.weighted_loss(PixelLoss::Iou, vertices, target, None)
     }
 
-    /// [`mse_loss`](Self::mse_loss) with pixel weights `[1 or views, height, width]` in [0, 1], which multiply the coverage. Without
-    /// weights, every pixel counts in full.
+    /// [`mse_loss`](Self::mse_loss) or [`iou_loss`](Self::iou_loss) with pixel weights `[1 or views, height, width]` in [0, 1], which
+    /// multiply the coverage. Without weights, every pixel counts in full.
     ///
     /// ```
-    /// use softrast_raster::{HostBackend, Projected, SoftRenderer, vertex_tensor};
+    /// use softrast_raster::{HostBackend, Projected, SoftRenderer, low_level::PixelLoss, vertex_tensor};
     /// use softrast_softness::Family;
     /// use softrast_tensor::{Tensor, numbers};
     ///
@@ -50,39 +50,16 @@ impl<S: Softness> SoftRenderer<S> {
     /// let renderer = SoftRenderer::new(&[[0, 1, 2]], 8, Family::Logistic, 0.02);
     /// // Weights of 0 leave an empty image.
     /// let full = |x: f64| Tensor::full([1, 8, 8], x, &device);
-    /// let loss = renderer.weighted_mse_loss(corners.clone(), full(1.0), Some(full(0.0)));
-    /// assert_eq!(numbers(loss), [1.0]);
-    /// let loss = renderer.weighted_iou_loss(corners, full(1.0), Some(full(0.0)));
-    /// assert_eq!(numbers(loss), [1.0]);
+    /// for loss in [PixelLoss::SquaredError, PixelLoss::Iou] {
+    ///     let loss = renderer.weighted_loss(loss, corners.clone(), full(1.0), Some(full(0.0)));
+    ///     assert_eq!(numbers(loss), [1.0]);
+    /// }
     /// ```
     ///
     /// # Panics
     ///
     /// If the target or the weights have another size.
-    pub fn weighted_mse_loss<B: RasterBackend>(
-        &self,
-        vertices: Projected<B>,
-        target: Tensor<B, 3>,
-        counted: Option<Tensor<B, 3>>,
-    ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::SquaredError, vertices, target, counted)
-    }
-
-    /// [`iou_loss`](Self::iou_loss) with pixel weights; see [`weighted_mse_loss`](Self::weighted_mse_loss).
-    ///
-    /// # Panics
-    ///
-    /// If the target or the weights have another size.
-    pub fn weighted_iou_loss<B: RasterBackend>(
-        &self,
-        vertices: Projected<B>,
-        target: Tensor<B, 3>,
-        counted: Option<Tensor<B, 3>>,
-    ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::Iou, vertices, target, counted)
-    }
-
-    fn loss<B: RasterBackend>(
+    pub fn weighted_loss<B: RasterBackend>(
         &self,
         loss: PixelLoss,
         vertices: Projected<B>,
@@ -95,6 +72,6 @@ impl<S: Softness> SoftRenderer<S> {
         }
         let vertices = vertices.tensor();
         let (silhouette, table) = self.own_table(&vertices);
-        silhouette.loss(loss, vertices, table, target, counted)
+        silhouette.loss_by_table(loss, vertices, table, target, counted)
     }
 }
