@@ -1,6 +1,7 @@
 //! Poses from the user's pictures.
 
 mod answer;
+mod camera_forms;
 
 use std::path::{Path, PathBuf};
 
