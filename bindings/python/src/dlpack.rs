@@ -66,7 +66,7 @@ impl<'a> Lent<'a> {
         if code != 2 || lanes != 1 || !matches!(bits, 32 | 64) || lengths.len() != axes {
             return Err(refused("arrays must be float32 or float64"));
         }
-        let address = managed.data.addr().checked_add(managed.offset as usize);
+        let address = managed.data.expose_provenance().checked_add(managed.offset as usize);
         let aligned = |address: &usize| address.is_multiple_of(usize::from(bits / 8));
         let address = address.filter(aligned).filter(|_| !managed.data.is_null());
         let address = address.ok_or_else(|| refused("an array lies nowhere, or is not aligned"))?;
@@ -87,15 +87,19 @@ impl<'a> Lent<'a> {
     /// The numbers, if they have this type and lie on the CPU.
     pub(crate) fn numbers<F: Float>(&self) -> Option<&'a [F]> {
         // SAFETY: these are as many aligned floats in memory that the capsule keeps.
-        self.holds::<F>()
-            .then(|| unsafe { slice::from_raw_parts(self.address as *const F, self.count()) })
+        self.holds::<F>().then(|| unsafe {
+            slice::from_raw_parts(
+                std::ptr::with_exposed_provenance::<F>(self.address),
+                self.count(),
+            )
+        })
     }
 
     /// Writes numbers on the CPU. Returns whether there are as many of this type.
     pub(crate) fn write<F: Float>(&self, values: &[F]) -> bool {
         let fits = self.holds::<F>() && self.count() == values.len();
         if fits {
-            let to = self.address as *mut F;
+            let to = std::ptr::with_exposed_provenance_mut::<F>(self.address);
             // SAFETY: as for `numbers`; results were allocated for this call, and nothing else uses them yet.
             unsafe { to.copy_from_nonoverlapping(values.as_ptr(), values.len()) };
         }

@@ -265,8 +265,7 @@ def drawn(given, out):
 def test_a_capsule_is_read_where_it_says():
     expected = st.project(torch.eye(3), torch.from_numpy(ORBITS))
     found = np.full((2, 3, 4), np.nan, np.float32)
-    strides = [4, 1]
-    for given in (capsule(ORBITS), capsule(ORBITS, offset=16), capsule(ORBITS, strides=strides), capsule(ORBITS[None][0], strides=[4, 1])):
+    for given in (capsule(ORBITS), capsule(ORBITS, offset=16), capsule(ORBITS, strides=[4, 1])):
         found[:] = np.nan
         drawn(given, capsule(found))
         assert np.array_equal(st.project(torch.eye(3), torch.from_numpy(found)), expected)

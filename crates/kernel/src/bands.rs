@@ -21,7 +21,7 @@ const MOST_ROWS: usize = 64;
 const FEW_VIEWS: usize = 4;
 /// No band has more rows: a list has eight bits for them.
 const ROWS: usize = 255;
-/// No band but the last has fewer rows: a list takes up to eight rows of a face at once.
+/// A band has at least as many rows, unless too few are left for the bands below: a list takes up to eight rows of a face at once.
 const LEAST_ROWS: usize = 6;
 /// Faces or vertices per rayon task.
 const AT_ONCE: usize = 1 << 11;

@@ -14,15 +14,17 @@ type F32x8 = Plain<f32>;
 /// A call of a function that is generic over vectors: those of this machine for a float type `F`, or arrays if it has none.
 macro_rules! on_vectors {
     ($function:ident::<Dual<$float:ident>>($($argument:expr),*)) => {
-        match $crate::lanes::has_vectors() {
-            true => $function::<Dual<$float::Best>>($($argument),*),
-            false => $function::<Dual<$crate::lanes::Plain<$float>>>($($argument),*),
+        if $crate::lanes::has_vectors() {
+            $function::<Dual<$float::Best>>($($argument),*)
+        } else {
+            $function::<Dual<$crate::lanes::Plain<$float>>>($($argument),*)
         }
     };
     ($function:ident::<$float:ident>($($argument:expr),*)) => {
-        match $crate::lanes::has_vectors() {
-            true => $function::<$float::Best>($($argument),*),
-            false => $function::<$crate::lanes::Plain<$float>>($($argument),*),
+        if $crate::lanes::has_vectors() {
+            $function::<$float::Best>($($argument),*)
+        } else {
+            $function::<$crate::lanes::Plain<$float>>($($argument),*)
         }
     };
 }

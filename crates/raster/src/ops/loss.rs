@@ -12,6 +12,9 @@ use crate::{
     },
 };
 
+/// Numbers of a gradient that are scaled per task.
+const SCALED: usize = 1 << 14;
+
 /// The loss of silhouettes relative to a target, in one op: the forward pass also computes its gradient with respect to the vertices.
 #[derive(Clone, Debug)]
 pub struct SilhouetteLoss {
@@ -84,11 +87,12 @@ impl SilhouetteLoss {
                 let views = numbers.par_chunks(of_view.max(1)).zip(rest[0]);
                 scaled.par_chunks_mut(of_view.max(1)).zip(views).for_each(
                     |(scaled, (own, &factor))| {
-                        task("scaling", || {
-                            scaled
-                                .iter_mut()
-                                .zip(own)
-                                .for_each(|(to, &number)| *to = number * factor);
+                        let parts = scaled.par_chunks_mut(SCALED).zip(own.par_chunks(SCALED));
+                        parts.for_each(|(scaled, own)| {
+                            let numbers = scaled.iter_mut().zip(own);
+                            task("scaling", || {
+                                numbers.for_each(|(to, &number)| *to = number * factor)
+                            });
                         });
                     },
                 );

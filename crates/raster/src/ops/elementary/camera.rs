@@ -83,6 +83,7 @@ const BLOCK: usize = 256;
 const POINTS: usize = 8 * BLOCK;
 /// Points per task that adds up the gradients of all views; divides [`POINTS`].
 const TOGETHER: usize = 512;
+const _: () = assert!(POINTS.is_multiple_of(TOGETHER));
 
 impl Perspective {
     /// The point of a view and its projection: x, y, depth, and one over the depth used as divisor.

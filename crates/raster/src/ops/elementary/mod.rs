@@ -95,12 +95,8 @@ impl<'a, N> Views<'a, N> {
         Self { numbers, length, shared: dims[0] == 1 }
     }
 
-    pub(super) fn range(&self, view: usize) -> std::ops::Range<usize> {
-        let start = if self.shared { 0 } else { view * self.length };
-        start..start + self.length
-    }
-
     pub(super) fn of(&self, view: usize) -> &'a [N] {
-        &self.numbers[self.range(view)]
+        let start = if self.shared { 0 } else { view * self.length };
+        &self.numbers[start..start + self.length]
     }
 }
