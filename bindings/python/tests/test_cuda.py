@@ -106,7 +106,9 @@ def derivatives(function, inputs):
     upstream = weights(*value.shape).to(value).requires_grad_()
     first = torch.autograd.grad(value, leaves, upstream, create_graph=True)
     along = sum((x * weights(*x.shape).to(x)).sum().to("cpu", torch.float64) for x in first)
-    second = torch.autograd.grad(along, [*leaves, upstream], allow_unused=True, materialize_grads=True)
+    every = [*leaves, upstream]
+    second = torch.autograd.grad(along, every, allow_unused=True)
+    second = [torch.zeros_like(x) if found is None else found for x, found in zip(every, second)]
     return [value.detach()], [x.detach() for x in first], [x.detach() for x in second]
 
 
