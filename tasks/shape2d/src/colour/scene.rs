@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use softrast_inverse::{SoftnessAt, Targets};
 use softrast_raster::{
-    Attributes, ColourRenderer, Projected, RasterBackend, Weighting, nearest_faces,
+    Attributes, Background, ColourRenderer, Projected, RasterBackend, Weighting, nearest_faces,
 };
 use softrast_softness::{DepthSoftness, Family, Softness};
 use softrast_tensor::{Tensor, numbers, tensor};
@@ -112,10 +112,7 @@ impl<B: RasterBackend> Scene<B> {
         renderer: &ColourRenderer<impl Softness>,
         tracked: Option<Tensor<B, 1>>,
     ) -> Tensor<B, 4> {
-        let [corners, colours, nearness] = self.parts(theta);
-        let background = renderer.background(&self.background, &corners.device());
-        let vertices = self.vertices(corners, nearness);
-        let colours = Attributes::of_faces(colours.reshape([1, self.faces.len(), 3]));
+        let (vertices, colours, background) = self.inputs(theta, renderer);
         let image = match tracked {
             None => renderer.image(vertices, &colours, &background),
             Some(phi) => {
@@ -125,6 +122,18 @@ impl<B: RasterBackend> Scene<B> {
             }
         };
         image.narrow(1, 0, 3)
+    }
+
+    /// What a renderer draws at θ.
+    fn inputs(
+        &self,
+        theta: Tensor<B, 1>,
+        renderer: &ColourRenderer<impl Softness>,
+    ) -> (Projected<B>, Attributes<B>, Background<B>) {
+        let [corners, colours, nearness] = self.parts(theta);
+        let background = renderer.background(&self.background, &corners.device());
+        let colours = Attributes::of_faces(colours.reshape([1, self.faces.len(), 3]));
+        (self.vertices(corners, nearness), colours, background)
     }
 
     /// The hard image at θ, `[1, 3, size, size]`: at each pixel the colour of the nearest triangle. It has no gradient.
@@ -144,6 +153,21 @@ impl<B: RasterBackend> Scene<B> {
     /// the size of the scene, possibly halved some times.
     pub fn image_loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
         self.targets.mse_loss(image.squeeze_dim(0)).mean()
+    }
+
+    /// [`image_loss`](Self::image_loss) of the [`image`](Self::image), as one op if nothing is differentiated with respect to φ.
+    pub fn loss(
+        &self,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
+    ) -> Tensor<B, 1> {
+        if softness.fixed_place().is_none() {
+            return self.image_loss(self.image(theta, softness));
+        }
+        let renderer = softness.colour_renderer(&self.faces, PLANES, DEPTH, DEPTH_SCALE);
+        let (vertices, colours, background) = self.inputs(theta, &renderer);
+        let (target, _) = self.targets.at(softness.side());
+        renderer.mse_loss(vertices, &colours, &background, target.unsqueeze())
     }
 
     /// The hard image at θ as SVG: the background, and one polygon per triangle, the farthest first.
@@ -192,14 +216,15 @@ impl<B: RasterBackend> Scene<B> {
 
 #[cfg(test)]
 mod tests {
-    use softrast_raster::HostBackend;
-    use softrast_softness::Softness;
-    use softrast_tensor::vector;
+    use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer, ScheduledSoftness};
+    use softrast_raster::{HostBackend, low_level::Rasterizer};
+    use softrast_softness::{EdgeSoftness, Softness};
+    use softrast_tensor::{Autodiff, vector};
 
     use super::*;
 
     /// A dark triangle over the left half and everything below it, and a nearer bright one at the right, on 4 × 4 pixels.
-    fn scene() -> Scene<HostBackend> {
+    fn scene<B: RasterBackend>() -> Scene<B> {
         let picture = Colours::new(vec![[0.2, 0.4, 0.6]; 16], 4);
         let start = Start {
             corners: vec![
@@ -218,7 +243,7 @@ mod tests {
 
     #[test]
     fn the_nearest_triangle_is_seen_and_the_mean_colour_where_there_is_none() {
-        let scene = scene();
+        let scene = scene::<HostBackend>();
         let red: Vec<f64> = numbers(scene.hard(scene.start()))[..16].to_vec();
         assert_eq!(red, [0.0, 0.0, 1.0, 1.0].repeat(4));
         let away = Tensor::cat(
@@ -233,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_narrow_softness_shows_nearly_the_hard_image() {
-        let scene = scene();
+        let scene = scene::<HostBackend>();
         let edge = Family::Gauss;
         let phi = vector(&edge.default_phi(1e-3));
         let soft = numbers(scene.image_with(scene.start(), edge, phi, 1e-4));
@@ -243,8 +268,30 @@ mod tests {
     }
 
     #[test]
+    fn the_loss_as_one_op_is_that_of_the_image() {
+        type B = Autodiff<HostBackend>;
+        let scene = scene::<B>();
+        let edges = ScheduledSoftness::constant(EdgeSoftness::new(Family::Logistic), 0.1);
+        let layout = PhiLayout::new(edges, Vec::new(), 1, 4);
+        let phi = layout.start();
+        let renderer =
+            ScheduledRenderer::new(layout, &phi, Rasterizer::new(4), Resolution::Full, None);
+        let [one, two] = [true, false].map(|is_one| {
+            let (softness, theta) = (renderer.at::<B>(0), scene.start().require_grad());
+            let loss = match is_one {
+                true => scene.loss(theta.clone(), &softness),
+                false => scene.image_loss(scene.image(theta.clone(), &softness)),
+            };
+            let gradient = theta.grad(&loss.backward()).unwrap();
+            [numbers(loss.inner()), numbers(gradient)].concat()
+        });
+        assert!(one.iter().filter(|x| x.abs() > 1e-3).count() > 5, "{one:?}");
+        assert!(one.iter().zip(&two).all(|(a, b)| (a - b).abs() < 1e-6), "{one:?} {two:?}");
+    }
+
+    #[test]
     fn what_is_allowed_has_colours_that_can_be_shown_and_moves_no_corner() {
-        let scene = scene();
+        let scene = scene::<HostBackend>();
         let theta = numbers(scene.allowed(scene.start() * 3.0));
         let start = numbers(scene.start());
         assert!(
@@ -256,7 +303,7 @@ mod tests {
 
     #[test]
     fn the_drawing_has_the_farthest_triangle_first() {
-        let scene = scene();
+        let scene = scene::<HostBackend>();
         let svg = scene.svg(&numbers(scene.start()));
         let places = ["#336699", "#003366", "#ff99cc"].map(|colour| svg.find(colour).unwrap());
         assert!(places.is_sorted(), "{svg}");

@@ -97,6 +97,15 @@ impl InverseProblem for Coloured {
         scene.image_loss(image)
     }
 
+    fn loss_at<B: RasterBackend>(
+        &self,
+        scene: &Scene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
+    ) -> Tensor<B, 1> {
+        scene.loss(theta, softness)
+    }
+
     fn defaults(&self) -> SolveConfig {
         SolveConfig { size: 256, steps: 400, learning_rate: 0.002 }
     }
