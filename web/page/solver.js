@@ -460,8 +460,8 @@ export class Solver {
       const pixel = 2 / size;
       const curves = found.flatMap(({ curves }, k) => curves.map((values, j) => ({ colour: RUNS[k], values, dash: j ? [5, 4] : [] })));
       softnessChart(this.canvases(null, "curve"), { curves, reach: REACH / pixel });
-      found.forEach(({ width, moves, feedback, curves }, k) => {
-        const how = feedback ? "Its width follows the error of the run, and a run that stalls restarts." : moves ? "Its width moves over the run." : "Its width is fixed.";
+      found.forEach(({ width, moves, adaptive, curves }, k) => {
+        const how = adaptive ? "Its width follows the error of the run, and a run that stalls restarts." : moves ? "Its width moves over the run." : "Its width is fixed.";
         chosen[k].hint.textContent = how + (curves.length > 1 ? " Dashed: what the gradient is taken of." : "");
         if (k === 0) slider.nextElementSibling.textContent = `${(width / pixel).toFixed(2)} px`;
       });

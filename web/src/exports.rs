@@ -46,7 +46,7 @@ pub fn names() -> String {
 }
 
 /// The curve of a softness at `progress` of a run, on images of `size` pixels, as JSON: `curves` (of the softness, and of its surrogate, if
-/// any, at `count` distances from `-reach` to `reach` in NDC), `width` in NDC, `scale`, `moves`, `feedback`, `family` and `note`.
+/// any, at `count` distances from `-reach` to `reach` in NDC), `width` in NDC, `scale`, `moves`, `adaptive`, `family` and `note`.
 #[wasm_bindgen]
 pub fn curve(
     choice: &str,
@@ -64,7 +64,7 @@ pub fn curve(
     let (width, scale) = (softness.width_at(progress, size), softness.scale_at(progress, size));
     let told = json!({
         "curves": curves, "width": width, "scale": scale, "moves": !softness.is_constant(),
-        "feedback": softness.feedback.is_some(), "family": softness.softness.family, "note": softness.note,
+        "adaptive": softness.adaptive.is_some(), "family": softness.softness.family, "note": softness.note,
     });
     Ok(told.to_string())
 }

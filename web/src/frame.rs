@@ -91,7 +91,7 @@ impl Frame {
             hard_loss: iterate.hard_loss[0],
             angle_deg: None,
             camera: None,
-            start: [iterate.begun_again, 0],
+            start: [iterate.restarts, 0],
             theta,
             soft: bytes(iterate.image.as_deref().unwrap_or_default()),
             hard: bytes(hard),

@@ -88,9 +88,9 @@ impl<B: RasterBackend> Run for MaskRun<B> {
     }
 
     fn prepare(&mut self, told: &mut dyn FnMut(f64)) -> anyhow::Result<()> {
-        // A softness with feedback solves one instance at a time; here there are many, at low resolution.
+        // An adaptive schedule solves one instance at a time; here there are many, at low resolution.
         let mut method = self.method.clone();
-        method.softness.feedback = None;
+        method.softness.adaptive = None;
         told(0.0);
         let steps = PoseSearch::steps_of_starts(&self.mask) as f64;
         let search = PoseSearch::new(&self.mesh, self.camera).with_method(method);

@@ -70,8 +70,8 @@ impl Softness {
     fn with_phi(&self, phi: Vec<f64>) -> PyResult<Self> {
         let softness = self.0.softness;
         check_phi("phi", softness.family.name(), softness.parameters(), &phi).map_err(refused)?;
-        let (schedule, feedback, surrogate) = (None, None, None);
-        Ok(Self(ScheduledSoftness { phi, schedule, feedback, surrogate, ..self.0.clone() }))
+        let (schedule, adaptive, surrogate) = (None, None, None);
+        Ok(Self(ScheduledSoftness { phi, schedule, adaptive, surrogate, ..self.0.clone() }))
     }
 
     /// Parameters φ `[P]`, float64, at `progress` of a run (0 to 1), on images whose shorter side has `size` pixels. A softness without a

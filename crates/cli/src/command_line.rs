@@ -73,8 +73,8 @@ pub(crate) struct Evaluate<A: Args> {
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub(crate) runs: Option<usize>,
     /// Second method for the same seeds, with its own flags in quotes: "gauss --scale 0.01"
-    #[arg(long, value_name = "NAME|FILE.json", value_parser = MethodArgs::parse)]
-    pub(crate) against: Option<MethodArgs>,
+    #[arg(long, value_name = "NAME|FILE.json", value_parser = MethodArgs::parse, alias = "against")]
+    pub(crate) baseline: Option<MethodArgs>,
     #[command(flatten)]
     pub(crate) kept: Kept,
     #[command(flatten)]

@@ -77,8 +77,8 @@ impl<T: Task> TaskExperiment<T> {
         let usual = task.defaults();
         let size = common.size.unwrap_or(usual.size);
         method.resolution.check(size).map_err(Error::usage)?;
-        // With feedback, the number of steps is tuned to the learning rate.
-        let takes = task.takes_learning_rate() || method.softness.feedback.is_some();
+        // With an adaptive schedule, the number of steps is tuned to the learning rate.
+        let takes = task.takes_learning_rate() || method.softness.adaptive.is_some();
         let of_method = method.softness.learning_rate.filter(|_| takes);
         let learning_rate = method_args.learning_rate.or(of_method).unwrap_or(usual.learning_rate);
         let steps = common.steps.unwrap_or(usual.steps);
@@ -116,16 +116,16 @@ impl<T: Task> TaskExperiment<T> {
         if T::RESTART_ABOVE.is_finite() {
             set("starts", self.starts.into());
         }
-        let schedule = match (softness.is_constant(), softness.feedback) {
+        let schedule = match (softness.is_constant(), softness.adaptive) {
             (true, _) => "static",
             (false, None) => "decay",
-            (false, Some(_)) => "feedback",
+            (false, Some(_)) => "adaptive",
         };
         set("schedule", schedule.into());
         set("squared", softness.softness.scale_is_squared().into());
-        for (name, part) in [("scale", 0.0), ("scale_end", 1.0)] {
-            set(name, softness.scale_at(part, size).into());
-            if let Some(Surrogate { softness, phi }) = softness.surrogate_at(part, size) {
+        for (name, progress) in [("scale", 0.0), ("scale_end", 1.0)] {
+            set(name, softness.scale_at(progress, size).into());
+            if let Some(Surrogate { softness, phi }) = softness.surrogate_at(progress, size) {
                 set("surrogate", softness.family.name().into());
                 set(&format!("surrogate_{name}"), softness.scale(&phi).into());
             }
@@ -194,8 +194,8 @@ impl<T: Task> TaskExperiment<T> {
                 // The time of a step is split over the runs of the batch.
                 let share = iterate.seconds.map(|time| time / instances.len() as f64);
                 solved.run.step_seconds.extend(share);
-                if iterate.begun_again > solved.run.begun_again.len() {
-                    solved.run.begun_again.push(iterate.step);
+                if iterate.restarts > solved.run.restarts.len() {
+                    solved.run.restarts.push(iterate.step);
                 }
                 solved.theta.clone_from(&thetas[k]);
             }
@@ -314,7 +314,7 @@ impl<T: Task> Experiment for TaskExperiment<T> {
     }
 
     fn batch_size(&self) -> usize {
-        if self.method.softness.feedback.is_some() { 1 } else { self.task.batch_size() }
+        if self.method.softness.adaptive.is_some() { 1 } else { self.task.batch_size() }
     }
 
     /// Tries further starts if the hard error is too large, and returns the result with the smallest.

@@ -44,8 +44,8 @@ pub struct Answer {
 }
 
 impl<A> Given<'_, A> {
-    /// The method of the command line; by default the preset of the task. A preset with feedback is replaced by the searched softness of
-    /// the task, else by the learned one: feedback controls a single run, and pictures are solved from many starts together.
+    /// The method of the command line; by default the preset of the task. An adaptive preset is replaced by the searched softness of
+    /// the task, else by the learned one: an adaptive schedule controls a single run, and pictures are solved from many starts together.
     ///
     /// # Errors
     ///
@@ -58,7 +58,7 @@ impl<A> Given<'_, A> {
         }
         let (name, scales) = &self.task;
         let method = self.method.method(name, scales, true)?;
-        if self.names_softness() || method.softness.feedback.is_none() {
+        if self.names_softness() || method.softness.adaptive.is_none() {
             return Ok(method);
         }
         let softness = Some(match ScheduledSoftness::searched(name) {

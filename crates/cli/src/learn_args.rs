@@ -13,8 +13,8 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_name = "NAME", value_parser = estimator)]
     estimator: Option<MetaGradient>,
     /// Updates of the softness
-    #[arg(long, value_name = "N", value_parser = count, default_value_t = 50, allow_negative_numbers = true)]
-    outer: usize,
+    #[arg(long, value_name = "N", value_parser = count, default_value_t = 50, allow_negative_numbers = true, alias = "outer")]
+    updates: usize,
     /// Instances per update
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
     batch: usize,
@@ -25,8 +25,8 @@ pub(crate) struct LearnArgs {
     #[arg(long)]
     learn_rate: bool,
     /// Learn an adaptive schedule: the error of a run controls its scale, learning rate and restarts; starts from a decay
-    #[arg(long)]
-    feedback: bool,
+    #[arg(long, alias = "feedback")]
+    adaptive: bool,
     /// Held-out instances for selecting the softness
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
     validation_runs: usize,
@@ -35,7 +35,7 @@ pub(crate) struct LearnArgs {
     patience: Option<usize>,
     /// Outer loss: a fixed narrow softness on a finer image or on the image's own pixels, the hard image of the last
     /// step or of the returned one, which have no gradient, or the inner loss itself, as in the paper [default: fixed;
-    /// own for direct, which needs it; returned with feedback]
+    /// own for direct, which needs it; returned with an adaptive schedule]
     #[arg(long, value_name = "fixed|pixels|hard|returned|own", value_parser = named::<OuterLoss>)]
     outer_loss: Option<OuterLoss>,
     /// The inner steps after which the outer loss is evaluated: the last, or a quarter, half and all of them [default: last]
@@ -78,11 +78,11 @@ impl LearnArgs {
         }
         LearnConfig {
             estimator,
-            updates: self.outer,
+            updates: self.updates,
             batch: self.batch,
             outer_rate: self.outer_rate,
             learn_rate: self.learn_rate,
-            feedback: self.feedback,
+            adaptive: self.adaptive,
             seed: usual.seed.saturating_add(seed),
             validation_seed: usual.validation_seed.saturating_add(seed),
             validation_runs: self.validation_runs,

@@ -20,10 +20,10 @@ pub(crate) fn learned_charts(
     let both = [("start", &start), ("learned", learned)];
     let mut steps = Vec::new();
     for (name, softness) in both {
-        for (when, part) in at {
-            let phi = softness.phi_at(*part, size);
+        for (when, progress) in at {
+            let phi = softness.phi_at(*progress, size);
             steps.push((format!("{name}{when}"), softness.softness, phi));
-            let surrogate = softness.surrogate_at(*part, size);
+            let surrogate = softness.surrogate_at(*progress, size);
             steps
                 .extend(surrogate.map(|s| (format!("{name}{when}, surrogate"), s.softness, s.phi)));
         }
@@ -51,11 +51,11 @@ pub(crate) fn learned_charts(
         });
         let name = if learned.softness.scale_is_squared() { "root of the scale" } else { "scale" };
         let scale = Axis::logarithmic(&format!("{name} (pixels)"));
-        let (along, caption) = match learned.feedback {
+        let (along, caption) = match learned.adaptive {
             None => ("inner step", "The scale of the softness over the inner steps."),
             Some(_) => (
-                "place on the path (steps, if it were followed by time)",
-                "The scale of the softness along its path. When a run is where follows from what it sees.",
+                "progress along the schedule (steps at constant pace)",
+                "The scale of the softness along its schedule. The error of a run determines its progress.",
             ),
         };
         let chart = Plot { series: series.into(), ..Plot::new(Axis::linear(along), scale) };

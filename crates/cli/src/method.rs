@@ -38,7 +38,7 @@ impl MethodArgs {
         let (name, softness) = match &self.softness {
             Some(SoftnessChoice::Auto) => {
                 return Err(Error::usage(
-                    "--softness auto goes with solve and evaluate, and not behind --against: name a family or a file",
+                    "--softness auto goes with solve and evaluate, and not behind --baseline: name a family or a file",
                 ));
             }
             Some(SoftnessChoice::File(file)) => {
@@ -78,9 +78,9 @@ impl MethodArgs {
     /// The softness of a file, with its learning rate if that is for this task.
     fn of_file(&self, file: ScheduledSoftness, task: &str) -> anyhow::Result<ScheduledSoftness> {
         let suits = file.task.as_ref().is_none_or(|learned_on| learned_on == task);
-        if file.feedback.is_some() && self.rate_end.is_some() {
+        if file.adaptive.is_some() && self.rate_end.is_some() {
             return Err(Error::usage(
-                "a softness with feedback moves its learning rate itself: leave out --rate-end, or name another softness",
+                "a softness with an adaptive schedule moves its learning rate itself: leave out --rate-end, or name another softness",
             ));
         }
         let learning_rate = file.learning_rate.filter(|_| suits);
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_falls_unless_feedback_moves_it() {
+    fn a_rate_falls_unless_an_adaptive_schedule_moves_it() {
         let end = |line: &str, task| {
             let softness = MethodArgs::parse(line).unwrap().method(task, &SCALES, true)?.softness;
             anyhow::Ok(softness.rate_end)
@@ -321,8 +321,8 @@ mod tests {
         assert_eq!(end("gauss", "none").unwrap(), None);
         assert_eq!(end("gauss --rate-end 0.2", "none").unwrap(), Some(0.2));
         assert_eq!(end("learned --rate-end 0.2", "pose").unwrap(), Some(0.2));
-        let feedback = end("preset --rate-end 0.2", "pose").unwrap_err();
-        assert!(feedback.to_string().contains("leave out --rate-end"), "{feedback}");
+        let adaptive = end("preset --rate-end 0.2", "pose").unwrap_err();
+        assert!(adaptive.to_string().contains("leave out --rate-end"), "{adaptive}");
     }
 
     #[test]

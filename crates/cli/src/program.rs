@@ -110,7 +110,10 @@ fn with_owner(mut failure: Failure, command: &clap::Command) -> Failure {
         return failure;
     };
     let has = |command: &&clap::Command| {
-        command.get_arguments().any(|argument| argument.get_long() == Some(flag))
+        command.get_arguments().any(|argument| {
+            let mut aliases = argument.get_all_aliases().into_iter().flatten();
+            argument.get_long() == Some(flag) || aliases.any(|alias| alias == flag)
+        })
     };
     let owners: Vec<&str> =
         command.get_subcommands().filter(has).map(clap::Command::get_name).collect();

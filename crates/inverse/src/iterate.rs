@@ -16,8 +16,8 @@ use crate::{
 pub struct Iterate {
     /// Steps taken so far.
     pub step: usize,
-    /// Restarts of a run with feedback so far.
-    pub begun_again: usize,
+    /// Restarts of the run so far; 0 without an adaptive schedule.
+    pub restarts: usize,
     /// Progress along the schedule, 0 to 1.
     pub progress: f64,
     /// Scale of the softness, in NDC (NDC² if squared).
@@ -114,7 +114,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         let hard = problem.hard_image(&self.host, theta.clone());
         Ok(Iterate {
             step,
-            begun_again: 0,
+            restarts: 0,
             progress,
             scale: self.renderer.scale(progress),
             theta,

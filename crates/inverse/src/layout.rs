@@ -2,7 +2,7 @@ use softrast_raster::RasterBackend;
 use softrast_softness::{EdgeSoftness, Softness};
 use softrast_tensor::{Tensor, tensor, vector};
 
-use crate::{Feedback, Input, LearnConfig, ScaleSchedule, ScheduledSoftness, Surrogate};
+use crate::{AdaptiveSchedule, Input, LearnConfig, ScaleSchedule, ScheduledSoftness, Surrogate};
 
 /// Least share of a scale above the floor at the start of a learned schedule.
 const ABOVE_FLOOR: f64 = 0.05;
@@ -14,7 +14,7 @@ const KNOTS: usize = 3;
 ///
 /// First come the knots of the schedule, if the scale moves or is learned separately. Then the parameters of the softness, at scale 1 and
 /// without the logarithm of the scale if a schedule replaces it. Then all parameters of the surrogate, which keeps its own ratio to the
-/// schedule. Then those of the feedback. Last come the problem's own parameters.
+/// schedule. Then those of the adaptive schedule. Last come the problem's own parameters.
 ///
 /// ```
 /// use softrast_inverse::{PhiLayout, ScheduledSoftness};
@@ -61,8 +61,8 @@ impl<S: Softness> PhiLayout<S> {
             let start = ScheduledSoftness { phi, surrogate, schedule: None, ..start.clone() };
             return Self::new(start, own, steps, size);
         }
-        let begun = Feedback { steps, ..Feedback::START };
-        let feedback = start.feedback.or(config.feedback.then_some(begun));
+        let begun = AdaptiveSchedule { steps, ..AdaptiveSchedule::START };
+        let adaptive = start.adaptive.or(config.adaptive.then_some(begun));
         let kept = start.schedule.as_ref().filter(|kept| {
             kept.floor_px > 0.0
                 && kept.knots.len() > 1
@@ -70,7 +70,7 @@ impl<S: Softness> PhiLayout<S> {
                 && config.floor_px.is_none()
         });
         if kept.is_some() {
-            return Self::new(ScheduledSoftness { feedback, ..start.clone() }, own, steps, size);
+            return Self::new(ScheduledSoftness { adaptive, ..start.clone() }, own, steps, size);
         }
         let floor_px = config.floor_px.unwrap_or(FLOOR_PX);
         let mut schedule = ScaleSchedule { knots: Vec::new(), floor_px };
@@ -84,7 +84,7 @@ impl<S: Softness> PhiLayout<S> {
         };
         schedule.knots = (0..knots).map(knot).collect();
         let start =
-            ScheduledSoftness { schedule: Some(schedule), feedback, ..at_unit_scale(start) };
+            ScheduledSoftness { schedule: Some(schedule), adaptive, ..at_unit_scale(start) };
         Self::new(start, own, steps, size)
     }
 
@@ -93,9 +93,9 @@ impl<S: Softness> PhiLayout<S> {
         let knots = self.start.schedule.iter().flat_map(|schedule| &schedule.knots);
         let surrogate = self.start.surrogate.iter().flat_map(|surrogate| &surrogate.phi);
         let phi = &self.start.phi[self.replaced()..];
-        let feedback = self.start.feedback.iter().flat_map(Feedback::parameters);
+        let adaptive = self.start.adaptive.iter().flat_map(AdaptiveSchedule::parameters);
         let edges = knots.chain(phi).chain(surrogate).copied();
-        edges.chain(feedback).chain(self.own.iter().copied()).collect()
+        edges.chain(adaptive).chain(self.own.iter().copied()).collect()
     }
 
     /// The softness that a vector stands for, and the problem's own parameters.
@@ -109,9 +109,10 @@ impl<S: Softness> PhiLayout<S> {
         let (surrogate, rest) = rest.split_at(self.surrogate_len());
         let mut softness = self.start.clone();
         let mut own = rest;
-        if let Some(feedback) = &mut softness.feedback {
-            let (numbers, rest) = rest.split_first_chunk().expect("φ holds the feedback too");
-            (*feedback, own) = (feedback.with(*numbers), rest);
+        if let Some(adaptive) = &mut softness.adaptive {
+            let (numbers, rest) =
+                rest.split_first_chunk().expect("φ holds those of the adaptive schedule too");
+            (*adaptive, own) = (adaptive.with(*numbers), rest);
         }
         softness.phi[self.replaced()..].copy_from_slice(phi);
         softness.schedule.iter_mut().for_each(|schedule| schedule.knots = knots.to_vec());

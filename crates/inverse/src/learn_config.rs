@@ -9,7 +9,7 @@ use crate::ScheduledSoftness;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LearnConfig {
     /// Estimator of the meta-gradient. By default an evolution strategy if the softness has up to ten parameters or
-    /// feedback, or the outer loss is [`OuterLoss::Returned`]; else [`MetaGradient::default`].
+    /// an adaptive schedule, or the outer loss is [`OuterLoss::Returned`]; else [`MetaGradient::default`].
     pub estimator: Option<MetaGradient>,
     /// Updates of the softness.
     pub updates: usize,
@@ -20,8 +20,8 @@ pub struct LearnConfig {
     /// Whether the logarithm of the inner learning rate is learned too.
     pub learn_rate: bool,
     /// Whether a softness with a moving scale learns an adaptive schedule, starting from
-    /// [`Feedback::START`](crate::Feedback::START).
-    pub feedback: bool,
+    /// [`AdaptiveSchedule::START`](crate::AdaptiveSchedule::START).
+    pub adaptive: bool,
     /// Seed of the first training instance.
     pub seed: u64,
     /// Seed of the first validation instance.
@@ -31,7 +31,7 @@ pub struct LearnConfig {
     /// Validations without an improvement before learning ends early.
     pub patience: Option<usize>,
     /// The outer loss. By default [`OuterLoss::Own`] for [`MetaGradient::Direct`],
-    /// [`OuterLoss::Returned`] with feedback, else [`OuterLoss::Fixed`].
+    /// [`OuterLoss::Returned`] with an adaptive schedule, else [`OuterLoss::Fixed`].
     pub outer_loss: Option<OuterLoss>,
     /// Steps after which the outer loss is evaluated.
     pub outer_steps: OuterSteps,
@@ -99,7 +99,7 @@ impl Default for LearnConfig {
             batch: 8,
             outer_rate: 0.03,
             learn_rate: false,
-            feedback: false,
+            adaptive: false,
             seed: TRAINING_SEED,
             validation_seed: 2 * TRAINING_SEED,
             validation_runs: 8,
@@ -126,13 +126,13 @@ impl LearnConfig {
     ) -> anyhow::Result<Self> {
         let (parameters, has_surrogate) =
             (softness.parameters() + own, softness.surrogate.is_some());
-        let has_feedback = self.feedback || softness.feedback.is_some();
+        let is_adaptive = self.adaptive || softness.adaptive.is_some();
         ensure!(
-            !self.feedback || !softness.is_constant(),
-            "--feedback moves the scale along its path: add --schedule decay"
+            !self.adaptive || !softness.is_constant(),
+            "--adaptive moves the scale along its schedule: add --schedule decay"
         );
         let es = MetaGradient::EvolutionStrategy { sigma: SIGMA, pairs: 1 };
-        let few = parameters <= FEW || has_feedback || self.outer_loss == Some(OuterLoss::Returned);
+        let few = parameters <= FEW || is_adaptive || self.outer_loss == Some(OuterLoss::Returned);
         let usual = if few { es } else { MetaGradient::default() };
         let estimator = self.estimator.unwrap_or(usual);
         let differences = matches!(estimator, MetaGradient::EvolutionStrategy { .. });
@@ -140,7 +140,7 @@ impl LearnConfig {
         let direct = estimator == MetaGradient::Direct;
         let usual = match direct {
             true => OuterLoss::Own,
-            false if has_feedback => OuterLoss::Returned,
+            false if is_adaptive => OuterLoss::Returned,
             false => OuterLoss::Fixed,
         };
         let outer_loss = self.outer_loss.unwrap_or(usual);
@@ -157,12 +157,12 @@ impl LearnConfig {
             "--outer-loss returned needs --estimator es, and a task whose softness is that of its edges alone"
         );
         ensure!(
-            !has_feedback || outer_loss == OuterLoss::Returned,
-            "a softness with feedback goes by the hard image, which has no gradient: it needs --estimator es and --outer-loss returned"
+            !is_adaptive || outer_loss == OuterLoss::Returned,
+            "an adaptive schedule depends on the hard image, which has no gradient: it needs --estimator es and --outer-loss returned"
         );
         ensure!(
-            softness.rate_end.is_none() || !has_feedback,
-            "feedback moves the learning rate itself: leave out --rate-end, or begin with a softness without one"
+            softness.rate_end.is_none() || !is_adaptive,
+            "an adaptive schedule moves the learning rate itself: leave out --rate-end, or begin with a softness without one"
         );
         ensure!(
             softness.rate_end.is_none_or(|end| end == 1.0) || outer_loss == OuterLoss::Returned,
@@ -240,30 +240,30 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_that_falls_is_learned_from_by_what_runs_return_and_not_with_feedback() {
+    fn a_falling_rate_needs_the_returned_loss_and_no_adaptive_schedule() {
         let decay = EdgeSoftness::new(Family::Gauss);
         let softness =
             ScheduledSoftness { rate_end: Some(0.2), ..ScheduledSoftness::decay(decay, 0.1, 0.01) };
         let plain = LearnConfig::default();
         let returned = LearnConfig { outer_loss: Some(OuterLoss::Returned), ..plain.clone() };
-        let feedback = LearnConfig { feedback: true, ..plain.clone() };
+        let adaptive = LearnConfig { adaptive: true, ..plain.clone() };
         assert!(returned.resolved(&softness, 0).is_ok());
-        for wrong in [plain, feedback] {
+        for wrong in [plain, adaptive] {
             let refused = wrong.resolved(&softness, 0).unwrap_err().to_string();
             assert!(refused.contains("leave out --rate-end"), "{refused}");
         }
     }
 
     #[test]
-    fn feedback_is_learned_by_differences_of_what_runs_return() {
-        let config = LearnConfig { feedback: true, ..LearnConfig::default() };
-        assert!(resolved(&config, Family::Gauss).is_err(), "a scale that stays has no path");
+    fn an_adaptive_schedule_is_learned_by_differences_of_the_returned_loss() {
+        let config = LearnConfig { adaptive: true, ..LearnConfig::default() };
+        assert!(resolved(&config, Family::Gauss).is_err(), "a fixed scale has no schedule");
         let gauss = EdgeSoftness::new(Family::Gauss);
         let moving = ScheduledSoftness::decay(gauss, 0.1, 0.01);
         let found = config.resolved(&moving, 0).unwrap();
         assert_eq!(found.outer_loss, Some(OuterLoss::Returned));
         assert!(matches!(found.estimator, Some(MetaGradient::EvolutionStrategy { .. })));
-        let unrolled = LearnConfig { feedback: true, ..with(MetaGradient::default()) };
+        let unrolled = LearnConfig { adaptive: true, ..with(MetaGradient::default()) };
         let hard = LearnConfig { outer_loss: Some(OuterLoss::Hard), ..config.clone() };
         assert!(unrolled.resolved(&moving, 0).is_err() && hard.resolved(&moving, 0).is_err());
         assert!(config.resolved(&moving, 1).is_err());

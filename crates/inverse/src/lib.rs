@@ -118,7 +118,9 @@ pub use remeshing_adam::RemeshingAdam;
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
 pub use save_picture::{save_colour_picture, save_picture};
-pub use schedule::{Feedback, Follower, Place, ScaleSchedule, ScheduledSoftness, Surrogate};
+pub use schedule::{
+    AdaptiveSchedule, AdaptiveStep, Controller, ScaleSchedule, ScheduledSoftness, Surrogate,
+};
 pub use silhouette_pixels::silhouette_pixels;
 pub use softness_file::{DepthSoftnessFile, NameOrFile, NamedSoftness, SoftnessFileError};
 pub use surface::Surface;

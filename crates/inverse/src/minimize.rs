@@ -8,23 +8,24 @@ use softrast_tensor::{Autodiff, Tensor, read_sync};
 use web_time::Instant;
 
 use crate::{
-    Follower, InverseProblem, Iterate, Method, Place, ScaleSchedule, SolveConfig, iterate::Run,
+    AdaptiveStep, Controller, InverseProblem, Iterate, Method, ScaleSchedule, SolveConfig,
+    iterate::Run,
 };
 
-/// Most starts of a problem that a run with feedback uses; after these it restarts from its current scene.
+/// Most starts of a problem that a run with an adaptive schedule uses; after these it restarts from its current scene.
 const STARTS: usize = 8;
 
 /// Minimizes a problem's loss from its start, with all `instances` solved together, and returns the final result.
 ///
 /// Every iterate from start to end is passed to `visit`, with the scene on the CPU. Time spent in `visit` does not
 /// count as time of a step. Parameters without a gradient, for example where nothing was drawn, do not change. If the
-/// softness has feedback and a run is stuck, it restarts from the next start of the problem. A [`Minimization`] takes
+/// softness has an adaptive schedule and a run is stalled, it restarts from the next start of the problem. A [`Minimization`] takes
 /// one step per call, and can return images.
 ///
 /// # Errors
 ///
 /// The errors of `visit` and of the device, which end the descent; if there is no instance, or more than one with
-/// feedback, because each such run has its own progress.
+/// an adaptive schedule, because each such run has its own progress.
 pub fn minimize<P: InverseProblem, B: RasterBackend>(
     problem: &P,
     instances: &[P::Instance],
@@ -71,14 +72,14 @@ pub struct Minimization<
     instances: Vec<P::Instance>,
     config: SolveConfig,
     pictures: bool,
-    follower: Option<Follower>,
-    /// Factor of the learning rate at the end, without feedback.
+    controller: Option<Controller>,
+    /// Factor of the learning rate at the end, without an adaptive schedule.
     rate_end: f64,
     optimizer: Adam,
     theta: Tensor<B, 1>,
     state: AdamState<B, 1>,
     /// Progress and learning rate of the latest step.
-    place: Place,
+    current: AdaptiveStep,
     /// Starts used so far.
     starts: usize,
     latest: Option<Latest<B>>,
@@ -100,7 +101,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
     ///
     /// # Errors
     ///
-    /// If there is no instance, or more than one where the softness has feedback.
+    /// If there is no instance, or more than one where the softness has an adaptive schedule.
     pub fn new(
         problem: R,
         instances: Vec<P::Instance>,
@@ -108,11 +109,11 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         config: &SolveConfig,
     ) -> anyhow::Result<Self> {
         ensure!(!instances.is_empty(), "there is no instance to solve");
-        let feedback = method.softness.feedback;
+        let adaptive = method.softness.adaptive;
         let rate_end = method.softness.rate_end.unwrap_or(1.0);
         ensure!(
-            instances.len() == 1 || feedback.is_none(),
-            "a softness with feedback solves one instance at a time, found {} side by side: name another softness",
+            instances.len() == 1 || adaptive.is_none(),
+            "a softness with an adaptive schedule solves one instance at a time, found {} together: name another softness",
             instances.len()
         );
         let run = Run::<P, B, R, S>::new(problem, &instances, method, config);
@@ -121,9 +122,9 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         let theta = problem.start(&run.scene).inner();
         Ok(Self {
             state: optimizer.init(&theta),
-            place: by_time(rate_end, 0, config.steps),
+            current: by_time(rate_end, 0, config.steps),
             rate_end,
-            follower: feedback.map(|feedback| feedback.follow(config.steps)),
+            controller: adaptive.map(|adaptive| adaptive.controller(config.steps)),
             config: *config,
             starts: 1,
             latest: None,
@@ -160,7 +161,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         let theta = self.theta.clone();
         // The gradients of all losses at once are those of their sum.
         let gradient = leaf.grad(&loss.backward()).unwrap_or_else(|| theta.zeros_like());
-        let learning_rate = self.place.rate * self.config.learning_rate;
+        let learning_rate = self.current.rate * self.config.learning_rate;
         let optimizer = Adam { learning_rate, ..self.optimizer };
         let (theta, state) = optimizer.step(theta, gradient, self.state.clone());
         self.state = state;
@@ -168,13 +169,13 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         (step + 1, Some(drawing))
     }
 
-    /// Moves to the progress of the next step, and restarts a run that is stuck.
-    fn placed(&mut self, step: usize, hard_loss: Option<f64>) {
-        self.place = match &mut self.follower {
+    /// Moves to the progress of the next step, and restarts a stalled run.
+    fn advance_schedule(&mut self, step: usize, hard_loss: Option<f64>) {
+        self.current = match &mut self.controller {
             Some(run) => run.next(hard_loss),
             None => by_time(self.rate_end, step, self.config.steps),
         };
-        if self.place.again {
+        if self.current.restarts {
             let problem = self.run.problem.borrow();
             if let Some(other) = problem.restart(&self.instances[0], self.starts, STARTS) {
                 self.theta = problem.start(&problem.scene::<B>(&[other], self.config.size));
@@ -199,21 +200,21 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         let (step, drawn) = self.stepped();
         let mut leaf = Tensor::from_inner(self.theta.clone());
         if step < self.config.steps {
-            self.placed(step, hard_loss);
+            self.advance_schedule(step, hard_loss);
             leaf = Tensor::from_inner(self.theta.clone()).require_grad();
         } else {
             self.ended = true;
         }
         let seconds = drawn.map(|drawing| (drawing + clock.elapsed()).as_secs_f64());
         let clock = Instant::now();
-        let seen = self.run.seen(self.place.progress, leaf.clone(), self.pictures);
+        let seen = self.run.seen(self.current.progress, leaf.clone(), self.pictures);
         // Waits for the GPU, including the end of the previous step. A browser cannot block.
         if cfg!(not(target_family = "wasm")) {
             B::sync(&seen.theta.device())?;
         }
         let (drawing, loss) = (clock.elapsed(), seen.loss.clone());
-        let read = self.run.read(step, self.place.progress, seen).await?;
-        let iterate = Iterate { seconds, begun_again: self.starts - 1, ..read };
+        let read = self.run.read(step, self.current.progress, seen).await?;
+        let iterate = Iterate { seconds, restarts: self.starts - 1, ..read };
         let hard_loss = iterate.hard_loss[0];
         self.latest = Some(Latest { step, leaf, loss, hard_loss, drawing });
         Ok(iterate)
@@ -230,8 +231,8 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Iterator
     }
 }
 
-/// Progress and learning rate of a step without feedback.
-fn by_time(rate_end: f64, step: usize, steps: usize) -> Place {
+/// Progress and learning rate of a step without an adaptive schedule.
+fn by_time(rate_end: f64, step: usize, steps: usize) -> AdaptiveStep {
     let progress = ScaleSchedule::progress(step, steps);
-    Place { progress, rate: rate_end.powf(progress), again: false }
+    AdaptiveStep { progress, rate: rate_end.powf(progress), restarts: false }
 }

@@ -68,9 +68,9 @@ pub struct Run {
     pub success: bool,
     /// Wall time of each step, in seconds: its share of the batch; without pictures and errors.
     pub step_seconds: Vec<f64>,
-    /// Steps at which it was stuck and restarted.
-    #[serde(default)]
-    pub begun_again: Vec<usize>,
+    /// Steps at which it stalled and restarted.
+    #[serde(alias = "begun_again", default)]
+    pub restarts: Vec<usize>,
     /// Warnings for the user, one line each, such as an empty target.
     pub warnings: Vec<String>,
     /// The first step with non-finite numbers; the curve ends before it.

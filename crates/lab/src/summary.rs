@@ -25,7 +25,7 @@ pub struct Summary {
     /// Finished and requested runs, if the user stopped the program.
     pub partial: Option<Partial>,
     /// Another experiment on the same seeds.
-    pub against: Option<Box<Comparison>>,
+    pub baseline: Option<Box<Comparison>>,
 }
 
 /// The returned step of the runs: the one with the smallest score.
@@ -85,7 +85,7 @@ impl Summary {
             step_seconds: [median(&steps), mean(&per_run)],
             warnings,
             partial: None,
-            against: None,
+            baseline: None,
         })
     }
 
@@ -103,7 +103,7 @@ impl Summary {
         json.insert("peak_memory_mib".into(), json!(peak_rss_mib()));
         json.insert("warnings".into(), json!(self.warnings));
         json.extend(self.partial.map(|partial| ("partial".into(), json!(partial))));
-        json.extend(self.against.as_ref().map(|against| ("against".into(), against.json())));
+        json.extend(self.baseline.as_ref().map(|baseline| ("baseline".into(), baseline.json())));
         json
     }
 
@@ -135,7 +135,7 @@ impl Summary {
         lines.push(line("returned", &self.returned.in_words(self.outcome.successes[1])));
         lines.push(line("success", &self.success(success_means)));
         lines.push(line("time", &self.time()));
-        lines.extend(self.against.iter().flat_map(|against| against.text()));
+        lines.extend(self.baseline.iter().flat_map(|baseline| baseline.text()));
         lines
     }
 
@@ -174,8 +174,8 @@ impl Summary {
             "The lower the better{gains}; \"returned\" is at the step that is returned.{means} {}.",
             self.time()
         ));
-        if let Some(against) = &self.against {
-            against.section(report);
+        if let Some(baseline) = &self.baseline {
+            baseline.section(report);
         }
         if self.outcome.many {
             report.folded("Every run at its end", |report| report.table(&self.each_run(runs)));

@@ -25,13 +25,13 @@ fn inputs(folder: &Path) {
 
 const LINES: &[(&str, &str)] = &[
     ("--softness softness.json --depth-softness depth.json --out .", ""),
-    ("evaluate --runs 1 --depth-softness depth_softness.json --against softness.json --out .", ""),
+    ("evaluate --runs 1 --depth-softness depth_softness.json --baseline softness.json --out .", ""),
     (
-        "learn --outer 1 --batch 1 --validation-runs 1 --softness softness.json --out .",
+        "learn --updates 1 --batch 1 --validation-runs 1 --softness softness.json --out .",
         "softness.json is an input of this run",
     ),
     (
-        "learn --outer 1 --batch 1 --validation-runs 1 --out .",
+        "learn --updates 1 --batch 1 --validation-runs 1 --out .",
         "softness.json is not a recorded result",
     ),
 ];
@@ -42,7 +42,7 @@ fn no_input_is_removed_replaced_or_shortened() {
     let folder = tempfile::tempdir().unwrap();
     inputs(folder.path());
     fs::remove_file(folder.path().join("softness.json")).unwrap();
-    let line = "learn --outer 1 --batch 1 --validation-runs 1 --depth-softness depth_softness.json --out .";
+    let line = "learn --updates 1 --batch 1 --validation-runs 1 --depth-softness depth_softness.json --out .";
     let before = kept::files(folder.path());
     let ended = OCCLUSION.run(folder.path(), line);
     let said = String::from_utf8_lossy(&ended.stderr);
@@ -61,6 +61,6 @@ fn names_of_files_reach_no_terminal_as_control_codes() {
     OCCLUSION.prints_no_control_codes(&[
         "--out IN/out",
         "--json --out IN/out",
-        "learn --outer 1 --batch 1 --validation-runs 1 --json --out IN/out-learn",
+        "learn --updates 1 --batch 1 --validation-runs 1 --json --out IN/out-learn",
     ]);
 }

@@ -191,7 +191,7 @@ fn a_file_with_a_surrogate_does_what_it_does_without() {
 }
 
 /// A few outer steps on small scenes.
-const LEARN: &str = "learn --outer 3 --steps 6 --batch 2 --validation-runs 2 --size 10";
+const LEARN: &str = "learn --updates 3 --steps 6 --batch 2 --validation-runs 2 --size 10";
 
 #[test]
 fn a_learned_softness_is_one_that_the_task_accepts() {
@@ -244,7 +244,7 @@ fn learning_goes_on_only_from_its_own_checkpoint() {
 #[test]
 fn flags_of_learning_that_make_no_sense_are_refused() {
     for (line, part) in [
-        ("solve --outer 3", "--outer goes with learn"),
+        ("solve --updates 3", "--updates goes with learn"),
         ("learn --runs 3", "--runs goes with evaluate, search"),
         ("learn --estimator truncated:0", "expected a whole number"),
         ("learn --estimator direct --outer-loss fixed", "leave out --outer-loss"),

@@ -11,8 +11,8 @@
 //! optimise it with `--optimise-fov`. `--instances released24` uses the released values, right or
 //! wrong, so that its numbers compare with the released curves.
 //!
-//! **Method.** The default is the softness learned here, a Gauss curve with an adaptive schedule: a run whose image shows that it is stuck
-//! restarts from another start around the given one, within the same steps. Without feedback about one run in twenty from 35 to 55 degrees
+//! **Method.** The default is the softness learned here, a Gauss curve with an adaptive schedule: a run that stalls
+//! restarts from another start around the given one, within the same steps. Without it about one run in twenty from 35 to 55 degrees
 //! ends in a wrong pose that looks alike, such as front for back. If the image still does not fit, `solve` makes whole runs from other
 //! starts and returns the best; `--starts 1` is one run, as in `evaluate`.
 //!

@@ -83,11 +83,11 @@ const LINES: &[(&str, &str)] = &[
     ("--softness softness.json --out .", ""),
     ("--softness=found/result.json --out found", "result.json is an input of this run"),
     (
-        "evaluate --runs 1 --mesh mesh.obj --softness softness.json --against softness.json --out .",
+        "evaluate --runs 1 --mesh mesh.obj --softness softness.json --baseline softness.json --out .",
         "",
     ),
     (
-        "evaluate --runs 1 --against 'found/result.json_--learning-rate_0.1' --out found",
+        "evaluate --runs 1 --baseline 'found/result.json_--learning-rate_0.1' --out found",
         "result.json",
     ),
     (
@@ -95,13 +95,13 @@ const LINES: &[(&str, &str)] = &[
         "",
     ),
     ("choose --search-runs 1 --mesh mesh.obj --tolerance 0.01 --resolution 8 --out .", ""),
-    ("learn --outer 1 --batch 1 --validation-runs 1 --mesh mesh.obj --out masks", ""),
+    ("learn --updates 1 --batch 1 --validation-runs 1 --mesh mesh.obj --out masks", ""),
     (
-        "learn --outer 1 --batch 1 --validation-runs 1 --softness softness.json --out .",
+        "learn --updates 1 --batch 1 --validation-runs 1 --softness softness.json --out .",
         "softness.json is an input of this run",
     ),
     (
-        "learn --outer 1 --batch 1 --validation-runs 1 --mesh mesh.obj --out .",
+        "learn --updates 1 --batch 1 --validation-runs 1 --mesh mesh.obj --out .",
         "softness.json is not a recorded result",
     ),
 ];

@@ -14,8 +14,8 @@ use std::{
 use serde_json::Value;
 use softrast_test_kit::mpirun;
 
-const EXACT: &str = "learn --estimator unrolled --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness logistic --quiet --json";
-const ES: &str = "learn --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness gauss --estimator es:0.2 --quiet --json";
+const EXACT: &str = "learn --estimator unrolled --size 16 --steps 12 --batch 3 --updates 3 --validation-runs 5 --softness logistic --quiet --json";
+const ES: &str = "learn --size 16 --steps 12 --batch 3 --updates 3 --validation-runs 5 --softness gauss --estimator es:0.2 --quiet --json";
 
 /// A mesh of few faces, because test builds may be slow.
 const MESH: &str =
@@ -67,7 +67,7 @@ fn any_number_of_processes_learns_the_same_to_the_last_bit() {
 
 #[test]
 fn a_lost_process_ends_all_and_another_number_goes_on() {
-    let long = EXACT.replace("--outer 3", "--outer 12");
+    let long = EXACT.replace("--updates 3", "--updates 12");
     let alone = tempfile::tempdir().unwrap();
     let expected = learned(alone.path(), None, &long);
     let out = tempfile::tempdir().unwrap();

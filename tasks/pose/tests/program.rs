@@ -193,7 +193,7 @@ fn every_command_runs_by_colour_at_any_size_and_with_a_mesh_of_its_own() {
         "evaluate --runs 3 --resolution auto --optimise-fov --instances released24",
         "search --runs 1 --search-runs 1 --loops 3 --scales 0.02,0.03 --learning-rates 0.2,0.4",
         "choose --search-runs 1",
-        "learn --outer 1 --batch 1 --validation-runs 1 --scale 0.02",
+        "learn --updates 1 --batch 1 --validation-runs 1 --scale 0.02",
         "solve --softness mlp --schedule decay --range 55-75 --variant transfer",
     ] {
         run(&format!("{command} --colour --size 8 --steps 2")).unwrap();
@@ -238,7 +238,7 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
 #[test]
 fn the_inner_learning_rate_is_learned_too_if_asked_for() {
     let out = tempfile::tempdir().unwrap();
-    let line = "learn --outer 1 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es \
+    let line = "learn --updates 1 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es \
                 --softness gauss --scale 0.02 --learning-rate 0.2 --learn-rate";
     run_in(out.path(), line).unwrap();
     let steps = fs::read_to_string(out.path().join("learn.jsonl")).unwrap();
@@ -255,7 +255,7 @@ fn the_inner_learning_rate_is_learned_too_if_asked_for() {
 #[test]
 fn a_surrogate_is_learned_kept_and_named() {
     let out = tempfile::tempdir().unwrap();
-    let line = "learn --outer 1 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es \
+    let line = "learn --updates 1 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es \
                 --softness gauss --scale 0.02 --surrogate-scale 0.2 --learning-rate 0.2";
     let json = run_in(out.path(), line).unwrap();
     assert_eq!(
@@ -293,7 +293,7 @@ fn it_ends_on_a_machine_of_one_core() {
     for line in [
         "--size 16 --steps 2",
         "evaluate --runs 3 --size 16 --steps 2",
-        "learn --size 16 --steps 2 --batch 2 --outer 1 --validation-runs 2 --softness logistic",
+        "learn --size 16 --steps 2 --batch 2 --updates 1 --validation-runs 2 --softness logistic",
     ] {
         let out = tempfile::tempdir().unwrap();
         PROGRAM.on_one_thread().run_in(out.path(), line).unwrap();

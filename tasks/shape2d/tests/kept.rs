@@ -43,9 +43,9 @@ const LINES: &[(&str, &str)] = &[
         "before_after.png is an input of this run",
     ),
     ("--softness softness.json --out .", ""),
-    ("evaluate --runs 1 --target target.png --against softness.json --out .", ""),
+    ("evaluate --runs 1 --target target.png --baseline softness.json --out .", ""),
     (
-        "learn --outer 1 --batch 1 --validation-runs 1 --softness softness.json --out .",
+        "learn --updates 1 --batch 1 --validation-runs 1 --softness softness.json --out .",
         "softness.json is an input of this run",
     ),
 ];

@@ -61,9 +61,9 @@ const LINES: &[(&str, &str)] = &[
         "--views fox --masks masks --template mine.obj --out masks",
         "views.png is an input of this run",
     ),
-    ("evaluate --runs 1 --mesh mesh.obj --against softness.json --out .", ""),
+    ("evaluate --runs 1 --mesh mesh.obj --baseline softness.json --out .", ""),
     (
-        "learn --outer 1 --batch 1 --validation-runs 1 --softness softness.json --out .",
+        "learn --updates 1 --batch 1 --validation-runs 1 --softness softness.json --out .",
         "softness.json is an input of this run",
     ),
 ];

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use softrast_cli::{MethodArgs, Scales, Schedule};
 use softrast_inverse::{
-    Feedback, Input, Instances, LearnConfig, Method, OuterLoss, PhiLayout, ScaleSchedule,
+    AdaptiveSchedule, Input, Instances, LearnConfig, Method, OuterLoss, PhiLayout, ScaleSchedule,
     ScheduledSoftness, SolveConfig,
 };
 use softrast_meta::{MetaGradient, Objective, TaskDistribution};
@@ -184,18 +184,18 @@ fn a_surrogate_goes_only_with_estimators_that_follow_what_replaces_the_derivativ
 }
 
 #[test]
-fn feedback_is_part_of_the_vector_and_judged_by_what_a_run_returns() {
-    let config = LearnConfig { feedback: true, ..LearnConfig::default() };
+fn an_adaptive_schedule_is_part_of_the_vector_and_uses_the_returned_loss() {
+    let config = LearnConfig { adaptive: true, ..LearnConfig::default() };
     let line = "logistic --schedule decay --surrogate-scale 0.2";
     let softness = method(line).softness;
     let layout = PhiLayout::learned(&softness, vec![7.0], STEPS, SIZE, &config);
     let start = layout.start();
     // Three knots preceded by the surrogate and followed by a custom parameter of the problem.
-    assert_eq!((start.len(), &start[4..10]), (11, &Feedback::START.parameters()[..]));
+    assert_eq!((start.len(), &start[4..10]), (11, &AdaptiveSchedule::START.parameters()[..]));
     let (learned, own) = layout.softness(&start);
     assert_eq!(
-        (learned.feedback, own),
-        (Some(Feedback { steps: STEPS, ..Feedback::START }), vec![7.0])
+        (learned.adaptive, own),
+        (Some(AdaptiveSchedule { steps: STEPS, ..AdaptiveSchedule::START }), vec![7.0])
     );
 
     // From 5, ten steps of 0.1 arrive at 4, whose image of integers has an error of 16.

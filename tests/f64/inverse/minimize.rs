@@ -1,6 +1,8 @@
 //! Descents whose positions are all known.
 
-use softrast_inverse::{Feedback, InverseProblem, Iterate, Method, ScheduledSoftness, minimize};
+use softrast_inverse::{
+    AdaptiveSchedule, InverseProblem, Iterate, Method, ScheduledSoftness, minimize,
+};
 use softrast_meta::{Adam, Optimizer};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::NdArray;
@@ -110,26 +112,26 @@ fn nothing_to_solve_is_an_error() {
     assert_eq!(end.unwrap_err().to_string(), "there is no instance to solve");
 }
 
-/// A moving scale with feedback, on a schedule of one step.
-fn with_feedback() -> Method {
+/// A moving scale with an adaptive schedule of one step.
+fn adaptive() -> Method {
     let softness = EdgeSoftness::new(Family::Logistic);
-    let feedback = Feedback {
+    let adaptive = AdaptiveSchedule {
         steps: 3,
-        passage: 0.0,
+        duration: 0.0,
         patience: 0.0,
-        stuck: 0.0,
-        early: 0.0,
-        room: -1.0,
+        stall_threshold: 0.0,
+        stall_slope: 0.0,
+        reserve: -1.0,
         rate_end: 0.0,
     };
     let decay = ScheduledSoftness::decay(softness, 0.1, 0.01);
-    Method::new("none", ScheduledSoftness { feedback: Some(feedback), ..decay })
+    Method::new("none", ScheduledSoftness { adaptive: Some(adaptive), ..decay })
 }
 
 #[test]
-fn a_run_that_is_stuck_begins_again_from_another_start_if_there_is_one() {
+fn a_stalled_run_restarts_from_another_start_if_there_is_one() {
     let problem = Square { floor: -10.0, seen: true };
-    let (method, config) = (with_feedback(), problem.defaults());
+    let (method, config) = (adaptive(), problem.defaults());
     for (start, second) in [(Square::MANY, Square::OTHER), (7.0, 6.75)] {
         let (mut places, mut scales) = (Vec::new(), Vec::new());
         let mut visit = |now: &Iterate| {
@@ -148,9 +150,9 @@ fn a_run_that_is_stuck_begins_again_from_another_start_if_there_is_one() {
 }
 
 #[test]
-fn runs_with_feedback_are_solved_one_at_a_time() {
+fn runs_with_an_adaptive_schedule_are_solved_one_at_a_time() {
     let problem = Square { floor: 0.0, seen: true };
-    let (method, config) = (with_feedback(), problem.defaults());
+    let (method, config) = (adaptive(), problem.defaults());
     let end = minimize::<_, B>(&problem, &START, &method, &config, |_, _| Ok(()));
     assert!(end.unwrap_err().to_string().contains("one instance at a time, found 2"));
 }

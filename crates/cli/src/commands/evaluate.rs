@@ -56,19 +56,19 @@ pub(crate) fn evaluate<T: Task>(
     session: &Session,
     flags: Evaluate<T::Args>,
 ) -> anyhow::Result<Output> {
-    let Evaluate { mut shared, runs, against, kept, auto } = flags;
+    let Evaluate { mut shared, runs, baseline, kept, auto } = flags;
     if kept.shard.is_some() && shared.method.softness == Some(SoftnessChoice::Auto) {
         let message = "shards may be of different speed, and so choose differently: run choose first, and name what it finds";
         return Err(Error::usage(message));
     }
-    session.claim(names_of_runs::<T>(true, against.is_some()))?;
+    session.claim(names_of_runs::<T>(true, baseline.is_some()))?;
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Evaluating)?;
-    let second = against.map(|method| {
+    let second = baseline.map(|method| {
         let method = method.beside(&shared.method);
         let Shared { args, common, .. } = &shared;
         TaskExperiment::<T>::new(args, common, &method, Purpose::Evaluating)
     });
-    let second = second.transpose().context("--against")?;
+    let second = second.transpose().context("--baseline")?;
     let seeds = seeds(shared.common.seed, runs.unwrap_or(first.description.runs));
     // Checks at once what would fail midway.
     seeds.iter().try_for_each(|&seed| first.task.instance(seed).map(drop))?;
@@ -136,8 +136,8 @@ fn run<T: Task>(
         let titles = [title(first, second), title(second, first)];
         let mut about = second.about();
         about.retain(|key, _| ["softness", "parameters", "settings"].contains(&key.as_str()));
-        let against = Comparison::new(titles, about, first, finished.evaluation, evaluation)?;
-        summary.against = Some(Box::new(against));
+        let baseline = Comparison::new(titles, about, first, finished.evaluation, evaluation)?;
+        summary.baseline = Some(Box::new(baseline));
     }
     let other = other.map(|(experiment, evaluation)| Finished { experiment, evaluation });
     write(session, folder, &finished, other.as_ref(), &summary, None)

@@ -59,7 +59,7 @@ pub(super) fn write<T: Task>(
     }
     folder.stage("curve.csv", csv(metrics, &evaluation.runs).as_bytes())?;
     if summary.outcome.many {
-        let named: Vec<_> = ["method", "against"].into_iter().zip(&convergences).collect();
+        let named: Vec<_> = ["method", "baseline"].into_iter().zip(&convergences).collect();
         folder.stage(OF_RUNS, convergence_csv(metrics, &named).as_bytes())?;
     }
     if let Some(second) = second {
@@ -112,7 +112,7 @@ fn page<T: Task>(
     }
     let means =
         " A line is the mean of all runs, the band around it the 95 % interval of the mean.";
-    let again = begun_again(&evaluation.runs);
+    let again = restart_note(&evaluation.runs);
     report.note(&format!(
         "All errors should fall to 0.{}{again}",
         if summary.outcome.many { means } else { "" }
@@ -128,18 +128,15 @@ fn page<T: Task>(
 }
 
 /// A sentence about runs that restarted, if there are any.
-fn begun_again(runs: &[Run]) -> String {
+fn restart_note(runs: &[Run]) -> String {
     match runs {
-        [Run { begun_again, .. }] if !begun_again.is_empty() => {
-            let steps: Vec<String> = begun_again.iter().map(usize::to_string).collect();
-            format!(
-                " The run was stuck and began again from another start at step {}.",
-                steps.join(" and at step ")
-            )
+        [Run { restarts, .. }] if !restarts.is_empty() => {
+            let steps: Vec<String> = restarts.iter().map(usize::to_string).collect();
+            format!(" The run stalled and restarted at step {}.", steps.join(" and at step "))
         }
-        _ => match runs.iter().filter(|run| !run.begun_again.is_empty()).count() {
+        _ => match runs.iter().filter(|run| !run.restarts.is_empty()).count() {
             0 => String::new(),
-            count => format!(" {count} of the runs were stuck and began again from another start."),
+            count => format!(" {count} of the runs stalled and restarted."),
         },
     }
 }

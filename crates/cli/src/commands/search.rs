@@ -177,8 +177,8 @@ fn space<T: Task>(
         around.iter().flat_map(|scale| SURROGATES.map(|ratio| scale * ratio)).collect();
     let wider = if has_surrogate && method.surrogate_scale.is_none() { &wider } else { none };
     let surrogate = SearchAxis { optional: true, ..SearchAxis::among("surrogate-scale", wider) };
-    // A given rate is fixed unless its end is given too; feedback moves the rate itself.
-    let stays = method.learning_rate.is_some() || base.method.softness.feedback.is_some();
+    // A given rate is fixed unless its end is given too; an adaptive schedule moves the rate itself.
+    let stays = method.learning_rate.is_some() || base.method.softness.adaptive.is_some();
     let falls = if stays { none } else { &RATE_ENDS };
     let mut axes = vec![
         axis("scale", method.scale, &around),

@@ -11,15 +11,15 @@ const LINE: &str = "evaluate --size 16 --steps 9 --runs 10";
 fn differences_are_those_of_two_evaluations_seed_by_seed() {
     let (_, first) = solved::<Disc>(&format!("{LINE} --learning-rate 0.1"));
     let (_, second) = solved::<Disc>(&format!("{LINE} --learning-rate 0.02"));
-    let line = format!("{LINE} --learning-rate 0.1 --against 'logistic_--learning-rate_0.02'");
+    let line = format!("{LINE} --learning-rate 0.1 --baseline 'logistic_--learning-rate_0.02'");
     let (out, both) = solved::<Disc>(&line);
-    let against = &both["against"];
+    let baseline = &both["baseline"];
     for error in ["image_error", "parameter_error"] {
         assert_eq!(both[error], first[error]);
-        assert_eq!(against[error], second[error]);
+        assert_eq!(baseline[error], second[error]);
         let [one, two] = [&first, &second].map(|json| numbers(&json[error]["per_run"]));
         let expected: Vec<f64> = one.iter().zip(&two).map(|(one, two)| one - two).collect();
-        let found = &against["difference"][error];
+        let found = &baseline["difference"][error];
         for (found, expected) in numbers(&found["per_run"]).iter().zip(&expected) {
             assert!((found - expected).abs() < 1e-14, "{found} {expected}");
         }
@@ -33,17 +33,17 @@ fn differences_are_those_of_two_evaluations_seed_by_seed() {
         assert_eq!(found["first_better"], share(|difference| difference < 0.0));
         assert_eq!(found["second_better"], share(|difference| difference > 0.0));
     }
-    assert!(against["difference"]["image_error"]["hard"]["mean"].is_number());
+    assert!(baseline["difference"]["image_error"]["hard"]["mean"].is_number());
     let page = fs::read_to_string(out.path().join("report.html")).unwrap();
     assert!(page.contains("logistic, learning rate 0.02"));
     let table = fs::read_to_string(out.path().join("convergence.csv")).unwrap();
-    assert_eq!(table.lines().filter(|row| row.starts_with("against,")).count(), 10);
+    assert_eq!(table.lines().filter(|row| row.starts_with("baseline,")).count(), 10);
 }
 
 #[test]
 fn a_method_does_not_differ_from_itself() {
-    let (_out, both) = solved::<Disc>(&format!("{LINE} --against logistic"));
-    let difference = &both["against"]["difference"]["parameter_error"];
+    let (_out, both) = solved::<Disc>(&format!("{LINE} --baseline logistic"));
+    let difference = &both["baseline"]["difference"]["parameter_error"];
     assert_eq!(numbers(&difference["per_run"]), [0.0; 10]);
     assert_eq!(difference["first_better"], 0.0);
     assert_eq!(difference["second_better"], 0.0);

@@ -12,10 +12,10 @@ use crate::{
 const COMMANDS: [&str; 6] = [
     "--size 8 --steps 2",
     "evaluate --size 8 --steps 2 --runs 2",
-    "evaluate --size 8 --steps 2 --runs 2 --against gauss",
+    "evaluate --size 8 --steps 2 --runs 2 --baseline gauss",
     "search --size 8 --steps 2 --runs 2 --search-runs 1 --loops 4 --schedule static --scale 0.05 --learning-rates 0.01,0.1",
     "choose --size 8 --steps 2 --search-runs 1 --resolution full --tolerance 1e-3",
-    "learn --outer 1 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es",
+    "learn --updates 1 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es",
 ];
 
 #[test]
@@ -33,7 +33,7 @@ fn a_second_run_replaces_the_results_of_the_first_and_leaves_the_rest() {
 
 #[test]
 fn what_a_run_of_this_kind_does_not_make_does_not_stay() {
-    let (out, _) = solved::<Disc>("evaluate --size 8 --steps 2 --runs 2 --against gauss");
+    let (out, _) = solved::<Disc>("evaluate --size 8 --steps 2 --runs 2 --baseline gauss");
     assert!(out.path().join("against_curve.csv").exists());
     run_in::<Disc>(out.path(), "evaluate --size 8 --steps 2 --runs 2").1.unwrap();
     assert!(!out.path().join("against_curve.csv").exists());
@@ -102,7 +102,7 @@ fn a_killed_run_locks_nobody_out_of_its_folder() {
     fs::write(out.path().join("notes.txt"), "mine").unwrap();
     for line in [
         "evaluate --size 8 --runs 100000 --quiet --out",
-        "learn --outer 100000 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es --quiet --out",
+        "learn --updates 100000 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es --quiet --out",
     ] {
         let name = line.split(' ').next().unwrap();
         let mut child = Command::new(crate::resume::program())

@@ -13,7 +13,7 @@ use crate::{
 };
 
 const LEARN: &str =
-    "learn --outer 3 --steps 3 --batch 2 --validation-runs 1 --size 8 --estimator es";
+    "learn --updates 3 --steps 3 --batch 2 --validation-runs 1 --size 8 --estimator es";
 
 /// The checkpoint, the steps and the result of a run.
 static WHOLE: LazyLock<(String, String, Value)> = LazyLock::new(|| {

@@ -194,11 +194,11 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("--steps", 2, "--steps"),
         ("--radius", 2, "--radius"),
         ("--resume", 2, "--resume goes with evaluate, search, choose, learn (see --help)"),
-        ("--against logistic", 2, "--against goes with evaluate"),
+        ("--baseline logistic", 2, "--baseline goes with evaluate"),
         ("evaluate --search-runs 3", 2, "--search-runs goes with search, choose"),
-        ("search --against logistic", 2, "--against goes with evaluate"),
-        ("evaluate --against sofft", 2, "one of logistic, bilogit, gauss"),
-        ("evaluate --against learned", 2, "--against: no softness learned comes"),
+        ("search --baseline logistic", 2, "--baseline goes with evaluate"),
+        ("evaluate --baseline sofft", 2, "one of logistic, bilogit, gauss"),
+        ("evaluate --baseline learned", 2, "--baseline: no softness learned comes"),
         ("evaluate --scales 1,2", 2, "--scales goes with search"),
         ("search --scales 0.1,0", 2, "positive"),
         ("search --search-runs 0", 2, "from 1"),
@@ -212,7 +212,7 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("search --seed 999999", 2, "seeds 1000000 to 1000007"),
         ("search --softness auto", 2, "--softness auto goes with solve and evaluate"),
         ("learn --softness auto", 2, "--softness auto goes with solve and evaluate"),
-        ("evaluate --against auto", 2, "--against: --softness auto goes with"),
+        ("evaluate --baseline auto", 2, "--baseline: --softness auto goes with"),
         ("learn --backend flex", 2, "learn is compiled for ndarray alone"),
         (
             "learn --outer-loss soft",
@@ -259,7 +259,7 @@ fn help_goes_to_the_standard_output() {
     for (line, parts) in [
         ("--help", ["solve", "evaluate", "search", "choose", "learn"]),
         ("solve --help", ["--softness", "--scale", "--radius", "--steps", "--json"]),
-        ("evaluate --help", ["--runs", "--against", "--resume", "--radius", "--softness"]),
+        ("evaluate --help", ["--runs", "--baseline", "--resume", "--radius", "--softness"]),
     ] {
         let help = run_in(out.path(), line).unwrap();
         for part in parts {

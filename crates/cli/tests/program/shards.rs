@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 
 const EVALUATE: &str =
-    "evaluate --runs 7 --size 8 --steps 2 --against 'logistic_--learning-rate_0.02'";
+    "evaluate --runs 7 --size 8 --steps 2 --baseline 'logistic_--learning-rate_0.02'";
 const SEARCH: &str = "search --runs 6 --search-runs 5 --size 16 --steps 4 --schedule static --scales 0.1,0.2 \
                       --learning-rates 0.02,0.5 --loops 40";
 

@@ -12,7 +12,7 @@ use crate::softness_file::stored::{
 impl ScheduledSoftness {
     /// The default of a task's program: the best known, learned or searched. Its note describes its origin.
     ///
-    /// Presets are learned on their task, for `pose` and `shape3d` with [feedback](crate::Feedback), except for `occlusion`,
+    /// Presets are learned on their task, for `pose` and `shape3d` with an [adaptive schedule](crate::AdaptiveSchedule), except for `occlusion`,
     /// whose preset a search found.
     ///
     /// # Errors
@@ -21,7 +21,7 @@ impl ScheduledSoftness {
     pub fn preset(task: &str) -> Result<Self, SoftnessFileError> {
         match task {
             "occlusion" => Self::searched(task),
-            "pose" | "shape3d" => Self::learned(&format!("{task}-feedback")),
+            "pose" | "shape3d" => Self::learned(&format!("{task}-adaptive")),
             _ => Self::learned(task),
         }
     }
@@ -49,8 +49,8 @@ impl Stored for ScheduledSoftness {
     const LEARNED: &'static [(&'static str, &'static str)] = learned![
         ".json":
         "shape2d", "shape2d-mlp", "shape2d-surrogate", "shape3d", "shape3d-mlp", "shape3d-surrogate",
-        "shape2d-feedback", "shape3d-feedback",
-        "pose", "pose-mlp", "pose-surrogate", "pose-feedback", "occlusion", "occlusion-mlp", "networks/pose",
+        "shape2d-adaptive", "shape3d-adaptive",
+        "pose", "pose-mlp", "pose-surrogate", "pose-adaptive", "occlusion", "occlusion-mlp", "networks/pose",
         "networks/pose-15-35", "networks/pose-55-75", "networks/shape3d", "networks/shape3d-0",
         "networks/shape3d-30", "networks/shape3d-60", "networks/shape3d-minus30",
         "networks/shape3d-minus60"
@@ -77,15 +77,19 @@ impl<S: Softness> ScheduledSoftness<S> {
         if let Some(end) = self.rate_end.filter(|end| !(*end > 0.0 && *end <= 1.0)) {
             return Err(format!(": the rate ends at {end} of itself, expected a share of 1"));
         }
-        match &self.feedback {
+        match &self.adaptive {
             Some(_) if self.rate_end.is_some() => {
-                return Err(" has a rate_end beside feedback, which has one of its own".into());
+                return Err(
+                    " has a rate_end next to an adaptive schedule, which has its own".into()
+                );
             }
             Some(_) if self.is_constant() => {
-                return Err(" has feedback, which moves along a schedule, but no schedule".into());
+                return Err(" has an adaptive schedule, but no schedule of its scale".into());
             }
-            Some(feedback) => {
-                feedback.check().map_err(|wrong| format!(" has feedback with {wrong}"))?;
+            Some(adaptive) => {
+                adaptive
+                    .check()
+                    .map_err(|wrong| format!(" has an adaptive schedule with {wrong}"))?;
             }
             None => {}
         }
@@ -113,7 +117,7 @@ mod tests {
     use softrast_softness::{EdgeSoftness, Family};
 
     use super::*;
-    use crate::{DepthSoftnessFile, Feedback, ScaleSchedule, Surrogate};
+    use crate::{AdaptiveSchedule, DepthSoftnessFile, ScaleSchedule, Surrogate};
 
     fn example(family: Family) -> ScheduledSoftness {
         let softness = EdgeSoftness::squared(family);
@@ -122,7 +126,7 @@ mod tests {
             softness,
             phi: softness.default_phi(1e-4),
             schedule: Some(schedule),
-            feedback: Some(Feedback::START),
+            adaptive: Some(AdaptiveSchedule::START),
             surrogate: Some(Surrogate { softness, phi: softness.default_phi(1e-2) }),
             learning_rate: Some(0.3),
             rate_end: None,
@@ -157,6 +161,40 @@ mod tests {
         let older = text.replace(r#""schedule":"#, r#""path":"#);
         assert_ne!(text, older);
         assert_eq!(serde_json::from_str::<ScheduledSoftness>(&older).unwrap(), file);
+    }
+
+    #[test]
+    fn a_file_with_the_older_names_of_an_adaptive_schedule_is_read() {
+        let text = serde_json::to_string(&example(Family::Gauss)).unwrap();
+        let names = [
+            ("adaptive", "feedback"),
+            ("duration", "passage"),
+            ("stall_threshold", "stuck"),
+            ("stall_slope", "early"),
+            ("reserve", "room"),
+        ];
+        let older = names.into_iter().fold(text.clone(), |text, (name, older)| {
+            let replaced = text.replace(&format!("\"{name}\":"), &format!("\"{older}\":"));
+            assert_ne!(text, replaced, "{name}");
+            replaced
+        });
+        let read = ScheduledSoftness::parse(&older, "a.json").unwrap();
+        assert_eq!(read, example(Family::Gauss));
+        assert_eq!(serde_json::to_string(&read).unwrap(), text);
+        // Distinct values, in the order of a file of version 0.2.0.
+        let older = r#"{"steps": 300, "passage": 4.5, "patience": -0.25, "stuck": -2.5,
+            "early": 3.5, "room": -1.0, "rate_end": -0.75}"#;
+        let read: AdaptiveSchedule = serde_json::from_str(older).unwrap();
+        assert_eq!((read.steps, read.parameters()), (300, [4.5, -0.25, -2.5, 3.5, -1.0, -0.75]));
+    }
+
+    #[test]
+    fn a_bundled_softness_is_found_by_its_older_name() {
+        for task in ["pose", "shape2d", "shape3d"] {
+            let [name, older] = ["adaptive", "feedback"].map(|kind| format!("{task}-{kind}"));
+            let [found, by_older] = [name, older].map(|name| ScheduledSoftness::learned(&name));
+            assert_eq!(found.unwrap(), by_older.unwrap(), "{task}");
+        }
     }
 
     #[test]

@@ -76,7 +76,7 @@ mod tests {
     use softrast_tensor::{Backend, Tensor};
 
     use super::*;
-    use crate::{Feedback, ScaleSchedule};
+    use crate::{AdaptiveSchedule, ScaleSchedule};
 
     /// A step with two parameters. A constant of it is code and not in files.
     #[derive(Clone, Debug, PartialEq)]
@@ -113,7 +113,7 @@ mod tests {
     fn example() -> ScheduledSoftness<Bent> {
         ScheduledSoftness {
             schedule: Some(ScaleSchedule { knots: vec![-3.5, -6.2], floor_px: 0.05 }),
-            feedback: Some(Feedback::START),
+            adaptive: Some(AdaptiveSchedule::START),
             surrogate: Some(Surrogate { softness: BENT, phi: vec![-4.0, 0.1] }),
             learning_rate: Some(0.3),
             task: Some("pose".into()),

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use softrast_raster::{SoftRenderer, low_level::Rasterizer};
 use softrast_softness::{EdgeSoftness, Softness, ln_scale};
 
-use super::{feedback::Feedback, scale_schedule::ScaleSchedule};
+use super::{adaptive::AdaptiveSchedule, scale_schedule::ScaleSchedule};
 
 /// A second softness whose slope replaces that of the first in the backward pass: a surrogate gradient.
 ///
@@ -32,7 +32,8 @@ pub struct Surrogate<S = EdgeSoftness> {
 
 /// A softness with its parameters and the schedule of its scale.
 ///
-/// In a JSON file its fields have these names; `path` is an older name of `schedule`. A file of a
+/// In a JSON file its fields have these names; `path` and `feedback` are
+/// older names of `schedule` and `adaptive`. A file of a
 /// custom softness has its [`NAME`](crate::NamedSoftness::NAME) in the field `softness`.
 ///
 /// ```
@@ -54,15 +55,15 @@ pub struct ScheduledSoftness<S = EdgeSoftness> {
     #[serde(alias = "path", default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<ScaleSchedule>,
     /// Adaptive schedule; without it, progress follows time.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub feedback: Option<Feedback>,
+    #[serde(alias = "feedback", default, skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<AdaptiveSchedule>,
     /// Surrogate of the gradient, if that is not the softness's own; it follows the same schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surrogate: Option<Surrogate<S>>,
     /// Learning rate of the optimisations that it was learned on, which suits it best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learning_rate: Option<f64>,
-    /// Factor of the learning rate at the end of a run, in (0, 1], reached geometrically. Feedback has its own factor instead.
+    /// Factor of the learning rate at the end of a run, in (0, 1], reached geometrically. An adaptive schedule has its own factor instead.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_end: Option<f64>,
     /// The task that it was learned on; without one, the learning rate applies to any task.
@@ -97,9 +98,9 @@ impl<S: Softness> ScheduledSoftness<S> {
 
     fn new(softness: S, scale: f64, schedule: Option<ScaleSchedule>) -> Self {
         let phi = softness.default_phi(scale);
-        let (feedback, surrogate, task, note) = (None, None, None, None);
+        let (adaptive, surrogate, task, note) = (None, None, None, None);
         let (learning_rate, rate_end) = (None, None);
-        Self { softness, phi, schedule, feedback, surrogate, learning_rate, rate_end, task, note }
+        Self { softness, phi, schedule, adaptive, surrogate, learning_rate, rate_end, task, note }
     }
 
     /// Adds the same softness at `scale`, in NDC (NDC² if squared), as surrogate.
@@ -124,12 +125,12 @@ impl<S: Softness> ScheduledSoftness<S> {
     }
 
     /// Number of free parameters: φ, that of the surrogate, the knots of the schedule, which
-    /// replace a family's own scale, and those of the feedback.
+    /// replace a family's own scale, and those of the adaptive schedule.
     pub fn parameters(&self) -> usize {
         let replaced = self.softness.logarithms().min(1);
         let knots = self.schedule.as_ref().map_or(0, |schedule| schedule.knots.len() - replaced);
-        let feedback = self.feedback.map_or(0, |_| Feedback::PARAMETERS);
-        self.phi.len() + knots + feedback + self.surrogate.as_ref().map_or(0, |of| of.phi.len())
+        let adaptive = self.adaptive.map_or(0, |_| AdaptiveSchedule::PARAMETERS);
+        self.phi.len() + knots + adaptive + self.surrogate.as_ref().map_or(0, |of| of.phi.len())
     }
 
     /// The scale of the schedule at `progress` of a run, 0 to 1, on images of `size` × `size` pixels;
@@ -209,7 +210,7 @@ impl<S> ScheduledSoftness<S> {
             softness: softness(self.softness),
             phi: self.phi,
             schedule: self.schedule,
-            feedback: self.feedback,
+            adaptive: self.adaptive,
             learning_rate: self.learning_rate,
             rate_end: self.rate_end,
             task: self.task,

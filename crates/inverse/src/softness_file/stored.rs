@@ -185,7 +185,10 @@ pub(crate) fn save(text: &str, path: &Path) -> Result<(), SoftnessFileError> {
 }
 
 pub(crate) fn learned_text<T: Stored>(name: &str) -> Result<&'static str, SoftnessFileError> {
-    let found = T::LEARNED.iter().find(|(of, _)| *of == name);
+    // Softnesses with an adaptive schedule were `TASK-feedback` up to version 0.2.
+    let current = name.strip_suffix("-feedback").map(|task| format!("{task}-adaptive"));
+    let current = current.as_deref().unwrap_or(name);
+    let found = T::LEARNED.iter().find(|(of, _)| *of == current);
     let (_, text) = found.ok_or_else(|| {
         let known: Vec<_> = T::LEARNED.iter().map(|(name, _)| *name).collect();
         SoftnessFileError::Unknown { name: name.to_owned(), known: known.join(", ") }

@@ -147,7 +147,7 @@ fn parameters(tested: &Tested) -> Levels {
             softness: edge,
             phi,
             schedule: None,
-            feedback: None,
+            adaptive: None,
             surrogate: None,
             learning_rate: None,
             rate_end: None,

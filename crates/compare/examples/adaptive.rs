@@ -1,11 +1,11 @@
-//! A POSE run that stalls under the best decay, the same pair with feedback, and the error of each method over time.
+//! A POSE run that stalls under the best decay, the same pair under an adaptive schedule, and the error of each method over time.
 //!
 //! ```text
-//! cargo run --release -p compare --features studies --example feedback              # 100 pairs
-//! cargo run --release -p compare --features studies --example feedback -- --quick   # 4 small pairs, to out/
+//! cargo run --release -p compare --features studies --example adaptive              # 100 pairs
+//! cargo run --release -p compare --features studies --example adaptive -- --quick   # 4 small pairs, to out/
 //! ```
 //!
-//! Writes `docs/studies/feedback-*.svg` and their points as CSV.
+//! Writes `docs/studies/adaptive-*.svg` and their points as CSV.
 
 #[allow(dead_code, reason = "not every study uses all of it")]
 mod common;
@@ -39,7 +39,7 @@ struct Method {
 struct Seen {
     scale: f64,
     hard_loss: f64,
-    begun_again: usize,
+    restarts: usize,
     /// Time of the steps so far.
     seconds: f64,
 }
@@ -57,11 +57,11 @@ fn main() -> anyhow::Result<()> {
         methods.map(|(name, method)| Ok(Method { name, runs: runs(&study, &method, pairs)? }));
     let methods = methods.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
     let [preset, _, decay] = methods.as_slice() else { unreachable!("three methods") };
-    let stuck = (0..pairs)
+    let stalled = (0..pairs)
         .find(|&k| least(&decay.runs[k]) > FAILED && least(&preset.runs[k]) < FAILED / 3.0);
-    match stuck {
+    match stalled {
         Some(seed) => {
-            println!("seed {seed} is stuck under the decay");
+            println!("seed {seed} stalls under the decay");
             let chart = |name: &str, y: &str, of: fn(&Seen) -> f64| {
                 let line = |method: &Method| {
                     let points = method.runs[seed].iter().enumerate();
@@ -76,12 +76,12 @@ fn main() -> anyhow::Result<()> {
                 let plot = Plot::new(Axis::linear("step"), Axis::logarithmic(y));
                 save(&study, name, &Plot { series, ..plot })
             };
-            chart("feedback-scale", "scale, NDC", |seen| seen.scale)?;
-            chart("feedback-error", "hard IoU loss", |seen| seen.hard_loss)?;
-            let again = preset.runs[seed].last().map_or(0, |seen| seen.begun_again);
-            println!("the preset begins again {again} times");
+            chart("adaptive-scale", "scale, NDC", |seen| seen.scale)?;
+            chart("adaptive-error", "hard IoU loss", |seen| seen.hard_loss)?;
+            let again = preset.runs[seed].last().map_or(0, |seen| seen.restarts);
+            println!("the preset restarts {again} times");
         }
-        None => println!("no pair is stuck under the decay and found by the preset"),
+        None => println!("no pair stalls under the decay and found by the preset"),
     }
     let all = methods.iter().flat_map(|method| &method.runs).filter_map(|run| run.last());
     let longest = all.map(|seen| seen.seconds).fold(0.0, f64::max);
@@ -98,7 +98,7 @@ fn main() -> anyhow::Result<()> {
         Axis::linear("seconds of the steps"),
         Axis::logarithmic("least hard IoU loss so far, mean"),
     );
-    save(&study, "feedback-seconds", &Plot { series, ..plot })
+    save(&study, "adaptive-seconds", &Plot { series, ..plot })
 }
 
 fn save(study: &Study, name: &str, plot: &Plot) -> anyhow::Result<()> {
@@ -119,8 +119,8 @@ fn runs(study: &Study, method: &str, pairs: usize) -> anyhow::Result<Vec<Vec<See
         let seen = seen.map(|iterate| {
             let iterate = iterate?;
             seconds += iterate.seconds.unwrap_or(0.0);
-            let (hard_loss, begun_again) = (iterate.hard_loss[0], iterate.begun_again);
-            Ok(Seen { scale: iterate.scale, hard_loss, begun_again, seconds })
+            let (hard_loss, restarts) = (iterate.hard_loss[0], iterate.restarts);
+            Ok(Seen { scale: iterate.scale, hard_loss, restarts, seconds })
         });
         seen.collect()
     };
