@@ -11,7 +11,7 @@
 //! | light a mesh | [`lambert`](raster::lambert), [`phong`](raster::phong), [`spherical_harmonics`](raster::spherical_harmonics) | [`texture`] |
 //! | find the camera of a mask | [`PoseSearch`](inverse::pose::PoseSearch) | [`pose_from_mask`] |
 //! | use a camera of a file or of one's own | [`Pinhole`](raster::Pinhole), [`Orbit`](raster::Orbit), [`Lens`](views::Lens), [`Cameras`](raster::Cameras) | [`pose_from_mask`] |
-//! | define a softness | [`Softness`](softness::Softness), [`Truncated`](softness::Truncated) for heavy tails | [`own_softness`] |
+//! | define a softness | [`Softness`](softness::Softness), [`Truncated`](softness::Truncated) for heavy tails | [`own_softness`], in colour [`own_colour`] |
 //! | learn a softness, and keep it in a file | [`learn`](fn@inverse::learn), [`NamedSoftness`](inverse::NamedSoftness) | [`learn`](https://github.com/softrast/softrast/blob/main/crates/softrast/examples/learn.rs), [`own_learned`] |
 //! | differentiate through an optimisation | [`meta`], `Autodiff<Autodiff<_>>` | [`meta_gradient`] |
 //! | read and write meshes | [`Mesh`](mesh::Mesh) | [`fit_masks`] |
@@ -43,6 +43,7 @@
 //! [`colour`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/colour.rs
 //! [`texture`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/texture.rs
 //! [`pose_from_mask`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/pose_from_mask.rs
+//! [`own_colour`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/own_colour.rs
 //! [`own_softness`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/own_softness.rs
 //! [`own_learned`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/own_learned.rs
 //! [`meta_gradient`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/meta_gradient.rs

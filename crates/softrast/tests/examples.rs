@@ -97,6 +97,19 @@ fn an_own_softness_says_how_far_it_reaches_and_fits_a_sphere_to_masks() {
 }
 
 #[test]
+fn an_own_softness_draws_colours_and_moves_a_mesh_to_a_picture() {
+    let said = runs("own_colour");
+    let first = said.lines().next().expect("a first step");
+    let [start, end] = [first, &said].map(|text| number_after(text, "mean squared error"));
+    assert!(start > 0.01 && end < 1e-4, "{said}");
+    let shift = said.lines().last().and_then(|line| line.strip_prefix("shift [")).expect("a shift");
+    let shift: Vec<f64> =
+        shift.trim_end_matches(']').split(", ").filter_map(|x| x.parse().ok()).collect();
+    let off = shift.iter().zip([0.05, 0.1, -0.05]).map(|(a, b)| (a - b).abs());
+    assert!(shift.len() == 3 && off.fold(0.0, f64::max) < 0.005, "{said}");
+}
+
+#[test]
 fn an_own_softness_is_learned_kept_in_a_file_and_solved_with() {
     let said = runs("own_learned");
     let [start, learned] =
