@@ -9,7 +9,7 @@ use softrast_lab::Shard;
 use softrast_raster::compiled_backends;
 
 use crate::{
-    Cell, Purpose, Variation,
+    Cell, Role, Variation,
     tasks::{AnyTask, TASKS, task},
 };
 
@@ -112,8 +112,7 @@ fn crossing(text: &str) -> Result<String, String> {
     match text {
         "" | "learned" | "learned-mlp" => Ok(text.to_owned()),
         _ => {
-            Err("expected what comes with the program for every task: learned or learned-mlp"
-                .into())
+            Err("expected a softness that is bundled for every task: learned or learned-mlp".into())
         }
     }
 }
@@ -184,14 +183,14 @@ impl Args {
         backends: &[&'static str],
         cells: &mut Vec<Cell>,
     ) -> anyhow::Result<()> {
-        let cell = |name: String, method: MethodArgs, backend, purpose| Cell {
+        let cell = |name: String, method: MethodArgs, backend, role| Cell {
             task,
             variant,
             method,
             name,
             backend,
             runs,
-            purpose,
+            role,
         };
         let is = |method: &MethodArgs, choice| {
             *method == MethodArgs { softness: Some(choice), ..MethodArgs::default() }
@@ -212,7 +211,7 @@ impl Args {
             if has_preset && shown_twice {
                 continue;
             }
-            cells.push(cell(name.clone(), method.clone(), None, Purpose::Compared));
+            cells.push(cell(name.clone(), method.clone(), None, Role::Compared));
         }
         for NamedMethod { name, method } in &self.varied {
             let Some(method) = method.as_ref().filter(|method| is_there(task, method)) else {
@@ -225,18 +224,18 @@ impl Args {
                 let side = usual.solve.size / 2;
                 let fewer =
                     MethodArgs { resolution: Some(Resolution::Side(side)), ..method.clone() };
-                let purpose = Purpose::Varied(Variation::Resolution);
-                cells.push(cell(varied(format!("resolution {side}")), fewer, None, purpose));
+                let role = Role::Varied(Variation::Resolution);
+                cells.push(cell(varied(format!("resolution {side}")), fewer, None, role));
                 // The usual tolerance of a moving width where this one is fixed, and vice versa.
                 let other = Method::usual_tolerance(usual.method.softness.is_constant());
                 let less = MethodArgs { tolerance: Some(other), ..method.clone() };
-                let purpose = Purpose::Varied(Variation::Tolerance);
-                cells.push(cell(varied(format!("tolerance {other:e}")), less, None, purpose));
+                let role = Role::Varied(Variation::Tolerance);
+                cells.push(cell(varied(format!("tolerance {other:e}")), less, None, role));
             }
             for backend in backends {
-                let purpose = Purpose::Varied(Variation::Backend);
+                let role = Role::Varied(Variation::Backend);
                 let name = varied(format!("backend {backend}"));
-                cells.push(cell(name, method.clone(), Some(backend), purpose));
+                cells.push(cell(name, method.clone(), Some(backend), role));
             }
         }
         Ok(())
@@ -262,8 +261,8 @@ impl Args {
         if !is_there(task, &method) {
             return Ok(None);
         }
-        let purpose = Purpose::Crossed(from.name);
-        Ok(Some(Cell { task, variant, method, name, backend: None, runs, purpose }))
+        let role = Role::Crossed(from.name);
+        Ok(Some(Cell { task, variant, method, name, backend: None, runs, role }))
     }
 
     fn runs_of(&self, k: usize, task: &AnyTask) -> u32 {
@@ -298,7 +297,7 @@ mod tests {
         assert_eq!((cells[0].task.name, cells[18].variant), ("shape2d", Variant::Transfer));
         assert_eq!((&*cells[0].name, &*cells[12].name), ("preset", "preset resolution 128"));
         let preset = MethodArgs { softness: Some(SoftnessChoice::Preset), ..MethodArgs::default() };
-        let is_default = |cell: &Cell| cell.method == preset && cell.purpose == Purpose::Compared;
+        let is_default = |cell: &Cell| cell.method == preset && cell.role == Role::Compared;
         assert!(is_default(&cells[0]) && !is_default(&cells[12]));
         let learned = |task: &str| cells.iter().any(|c| c.task.name == task && c.name == "learned");
         assert!(learned("shape3d") && learned("pose") && learned("occlusion"));
@@ -312,7 +311,7 @@ mod tests {
         assert_eq!(alone.len(), 2);
         let crossed: Vec<&str> = cells
             .iter()
-            .filter(|c| matches!(c.purpose, Purpose::Crossed(_)))
+            .filter(|c| matches!(c.role, Role::Crossed(_)))
             .map(|c| c.name.as_str())
             .collect();
         assert_eq!(crossed[..3], ["learned-shape3d", "learned-pose", "learned-occlusion"]);

@@ -17,13 +17,13 @@ pub struct Cell {
     pub backend: Option<&'static str>,
     /// Seeds, from 0 on.
     pub runs: u32,
-    /// Purpose of the cell.
-    pub purpose: Purpose,
+    /// Role of the cell.
+    pub role: Role,
 }
 
 /// Tables and charts that show a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub enum Role {
     /// All tables and charts except Table 6.
     Compared,
     /// A variation of another cell: a mark in the charts of error over seconds, but no curve.

@@ -17,7 +17,7 @@ mod tables;
 mod tasks;
 
 pub use args::{Args, NamedMethod};
-pub use cell::{Cell, Purpose, Variation};
+pub use cell::{Cell, Role, Variation};
 pub use documents::recomputed;
 pub use measured::{MeanError, Measured};
 pub use program::{compare, main};

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use softrast_cli::{Schedule, Searched, SoftnessChoice, Variant, is_preset_learned};
 use softrast_lab::{mean, mean_interval};
 
-use crate::{Cell, Measured, Purpose, TASKS, tasks::AnyTask};
+use crate::{Cell, Measured, Role, TASKS, tasks::AnyTask};
 
 /// Significant digits of a stored number.
 const DIGITS: usize = 5;
@@ -74,8 +74,8 @@ impl Record {
             family: family.to_owned(),
             setting: one.setting(),
             chosen: is_chosen(cell),
-            compared: !matches!(cell.purpose, Purpose::Crossed(_)),
-            varied: matches!(cell.purpose, Purpose::Varied(_)),
+            compared: !matches!(cell.role, Role::Crossed(_)),
+            varied: matches!(cell.role, Role::Varied(_)),
             learned_on: learned_on(cell),
             size: one.entry.solve.size,
             steps: one.entry.solve.steps,
@@ -119,13 +119,13 @@ fn learned_on(cell: &Cell) -> Option<[String; 2]> {
         Some(SoftnessChoice::Learned(kind)) => kind.clone().unwrap_or_default(),
         _ => return None,
     };
-    match cell.purpose {
-        Purpose::Crossed(from) => {
+    match cell.role {
+        Role::Crossed(from) => {
             let own = kind.strip_prefix(from).map(|kind| kind.trim_start_matches('-').to_owned());
             Some([own.unwrap_or(kind), from.to_owned()])
         }
-        Purpose::Compared => Some([kind, task.to_owned()]),
-        Purpose::Varied(_) => None,
+        Role::Compared => Some([kind, task.to_owned()]),
+        Role::Varied(_) => None,
     }
 }
 
