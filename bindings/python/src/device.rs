@@ -113,7 +113,7 @@ impl<B: RasterBackend> Store for On<B> {
         (values * factors.clone().reshape([parts, 1])).reshape([count])
     }
 
-    fn joined(parts: &[&Tensor<B, 1>]) -> Tensor<B, 1> {
+    fn concatenated(parts: &[&Tensor<B, 1>]) -> Tensor<B, 1> {
         Tensor::cat(parts.iter().copied().cloned().collect(), 0)
     }
 

@@ -162,12 +162,12 @@ impl Op {
         let lengths: Vec<_> = directions.iter().map(|direction| S::count(direction)).collect();
         self.0.check(pass, &dims, &lengths)?;
         let mut slices: Vec<_> = views.iter().map(|view| view.values).collect();
-        let joined: Option<Cow<'_, S::Slice>> = match *directions {
+        let concatenated: Option<Cow<'_, S::Slice>> = match *directions {
             [] => None,
             [one] => Some(Cow::Borrowed(one)),
-            _ => Some(Cow::Owned(S::joined(directions))),
+            _ => Some(Cow::Owned(S::concatenated(directions))),
         };
-        slices.extend(joined.as_deref());
+        slices.extend(concatenated.as_deref());
         caught(|| self.0.run::<S>(pass, &slices, &dims))
     }
 }

@@ -174,8 +174,8 @@ impl Silhouettes {
 
     /// Sums as they are differentiated, of a scene with these vertices.
     fn sums<'a, S: Store>(&'a self, drawing: &'a Drawing, views: &[View<'_, S>]) -> Tabled<'a, S> {
-        let felt = self.surrogate.as_ref().unwrap_or(drawing);
-        Tabled::new(self.recent.op(&felt.knots.op, &views[..1]), 1, felt, views[0].values)
+        let surrogate = self.surrogate.as_ref().unwrap_or(drawing);
+        Tabled::new(self.recent.op(&surrogate.knots.op, &views[..1]), 1, surrogate, views[0].values)
     }
 
     pub(crate) fn vjp<S: Store>(

@@ -93,8 +93,8 @@ impl Renderer {
         let ([height, width], faces) = (self.scene.size, self.faces);
         let renderer = &self.scene.renderer;
         let softness = renderer.softness().family;
-        let felt = if renderer.surrogate().is_some() { ", with a surrogate" } else { "" };
-        format!("Renderer({height} x {width} pixels, {faces} faces, {softness}{felt})")
+        let surrogate = if renderer.surrogate().is_some() { ", with a surrogate" } else { "" };
+        format!("Renderer({height} x {width} pixels, {faces} faces, {softness}{surrogate})")
     }
 
     /// The function from vertices `[views, 3, V]` and, unless it is the renderer's own, φ `[P]` to coverage `[views, height, width]`.

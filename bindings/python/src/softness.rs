@@ -1,4 +1,4 @@
-//! Softnesses: by name, from a file, or those that come along.
+//! Softnesses: by name, from a file, or bundled.
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -112,9 +112,9 @@ impl Softness {
 
     fn __repr__(&self) -> String {
         let squared = if self.squared() { ", squared" } else { "" };
-        let felt = if self.0.surrogate.is_some() { ", with a surrogate" } else { "" };
+        let surrogate = if self.0.surrogate.is_some() { ", with a surrogate" } else { "" };
         let moving = if self.0.is_constant() { "" } else { ", its scale moves over a run" };
-        format!("Softness({}{squared}, φ [{}]{felt}{moving})", self.family(), self.0.phi.len())
+        format!("Softness({}{squared}, φ [{}]{surrogate}{moving})", self.family(), self.0.phi.len())
     }
 }
 
@@ -132,7 +132,7 @@ pub(crate) fn families() -> Vec<&'static str> {
     Family::ALL.map(Family::name).to_vec()
 }
 
-/// The names of the softnesses that come along, for `Softness.learned`.
+/// The names of the bundled softnesses, for `Softness.learned`.
 #[pyfunction]
 pub(crate) fn learned_names() -> Vec<&'static str> {
     ScheduledSoftness::learned_names().collect()

@@ -34,8 +34,8 @@ pub(crate) trait Store: Clone + Send + Sync + 'static {
     /// The products of equal parts of the numbers and the factor of each.
     fn scaled(values: &Self::Slice, factors: &Self::Slice) -> Self::Owned;
     /// All numbers, one array after the other.
-    fn joined(parts: &[&Self::Slice]) -> Self::Owned;
-    /// The inverse of `joined`.
+    fn concatenated(parts: &[&Self::Slice]) -> Self::Owned;
+    /// The inverse of `concatenated`.
     fn split(values: Self::Owned, counts: &[usize]) -> Vec<Self::Owned>;
     fn finite(values: &Self::Slice) -> bool;
     /// Whether both have the same bits. Only on the host.
@@ -109,7 +109,7 @@ impl<F: Float> Store for F {
         all
     }
 
-    fn joined(parts: &[&[F]]) -> Vec<F> {
+    fn concatenated(parts: &[&[F]]) -> Vec<F> {
         parts.concat()
     }
 

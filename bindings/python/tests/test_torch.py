@@ -67,7 +67,7 @@ def test_a_softness_of_f32_images_learns_in_f64():
 def test_the_gradient_of_a_surrogate_is_that_of_the_wider_softness():
     softness = softrast.Softness.learned("shape3d-surrogate")
     draw = renderer(softness=softness)
-    felt = draw._native.surrogate()
+    surrogate = draw._native.surrogate()
     corners, camera = leaves()
     weights = torch.linspace(-1.0, 1.0, 60, dtype=torch.float64).reshape(2, 6, 5)
     seen = st.project(corners, camera)
@@ -76,9 +76,9 @@ def test_the_gradient_of_a_surrogate_is_that_of_the_wider_softness():
     (gradient,) = torch.autograd.grad((image * weights).sum(), seen, create_graph=True)
     # The image's own softness maps sums to coverage; the surrogate's gives the derivative of the sums.
     scene = np.ascontiguousarray(seen.detach().numpy().swapaxes(1, 2))
-    _, sums = felt.call("value", [scene], [], [])
+    _, sums = surrogate.call("value", [scene], [], [])
     upstream = ((1.0 - image) * weights).detach().numpy() * np.exp(sums)
-    (expected,) = felt.call("vjp", [scene, sums, upstream], [], [True])
+    (expected,) = surrogate.call("vjp", [scene, sums, upstream], [], [True])
     expected = torch.from_numpy(expected).transpose(1, 2)
     assert gradient.abs().max() > 1e-3 and torch.allclose(gradient, expected, rtol=1e-9, atol=1e-12)
     assert torch.autograd.grad(gradient.pow(2).sum(), corners)[0].isfinite().all()

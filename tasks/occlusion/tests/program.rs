@@ -184,8 +184,9 @@ fn a_file_with_a_surrogate_does_what_it_does_without() {
         fs::write(&path, text).unwrap();
         run(&format!("--size 8 --steps 3 --softness {}", path.display())).unwrap()
     };
-    let felt = r#", "surrogate": {"softness": {"family": "gauss", "squared": false}, "phi": [-5]}"#;
-    let [plain, both] = ["", felt].map(solved);
+    let surrogate =
+        r#", "surrogate": {"softness": {"family": "gauss", "squared": false}, "phi": [-5]}"#;
+    let [plain, both] = ["", surrogate].map(solved);
     assert_eq!(plain["image_error"], both["image_error"]);
     assert_eq!(plain["parameters"], both["parameters"]);
 }

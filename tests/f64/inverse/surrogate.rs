@@ -123,10 +123,10 @@ fn a_renderer_at_a_part_of_a_run_has_both_scales_of_that_part() {
         let [found, expected] = [moved, by_hand].map(|renderer| {
             let image =
                 numbers(renderer.silhouette(Projected::new(tensor::<B, 3>(&CORNERS, [1, 6, 3]))));
-            let felt = gradient(|corners| {
+            let pulled = gradient(|corners| {
                 (renderer.silhouette(Projected::new(corners)) * weights()).sum()
             });
-            [image, felt].concat()
+            [image, pulled].concat()
         });
         for (a, b) in found.into_iter().zip(expected) {
             assert!((a - b).abs() < 1e-4 * (1.0 + b.abs()), "{part}: {a}, not {b}");

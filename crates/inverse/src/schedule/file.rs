@@ -284,9 +284,9 @@ mod tests {
     #[test]
     fn a_surrogate_is_checked_like_the_softness() {
         let softness = r#"{"family": "gauss", "squared": false}"#;
-        let felt = r#"{"softness": {"family": "exp", "squared": false}, "phi": [0]}"#;
+        let surrogate = r#"{"softness": {"family": "exp", "squared": false}, "phi": [0]}"#;
         let message =
-            error(&format!(r#"{{"softness": {softness}, "phi": [0], "surrogate": {felt}}}"#));
+            error(&format!(r#"{{"softness": {softness}, "phi": [0], "surrogate": {surrogate}}}"#));
         assert!(message.ends_with("has 1 parameters, but exp has 2"), "{message}");
     }
 

@@ -8,7 +8,7 @@ use super::{adaptive::AdaptiveSchedule, scale_schedule::ScaleSchedule};
 
 /// A second softness whose slope replaces that of the first in the backward pass: a surrogate gradient.
 ///
-/// The image is that of the first softness: a sharp image with a wide gradient, which is not the derivative of the
+/// The image is that of the first softness: a sharp image with a surrogate gradient, which is not the derivative of the
 /// image. If the scale of the first follows a [`ScaleSchedule`], this one is evaluated at `d / scale(t)` too: it keeps
 /// its ratio to the first.
 ///
