@@ -2,7 +2,7 @@
 
 use crate::{
     Mesh,
-    stroke::{Stroke, distance, joined, rounded},
+    stroke::{Stroke, distance, rounded, smooth_min},
     surface_net::{Grid, surface_net},
 };
 
@@ -44,7 +44,7 @@ fn solid(p: [f64; 3]) -> f64 {
     let body = BODY.iter().map(|stroke| distance(p, stroke));
     let wings = WINGS.iter().map(|stroke| distance([x, FLAT * y, z], stroke));
     let others = [distance([FLAT * x, y, z], &FIN), distance([x, y, z], &ENGINE)];
-    body.chain(wings).chain(others).fold(f64::INFINITY, |a, b| joined(a, b, REACH))
+    body.chain(wings).chain(others).fold(f64::INFINITY, |a, b| smooth_min(a, b, REACH))
 }
 
 #[cfg(test)]

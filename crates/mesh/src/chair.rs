@@ -2,7 +2,7 @@
 
 use crate::{
     Mesh,
-    stroke::{Stroke, distance, joined, rounded},
+    stroke::{Stroke, distance, rounded, smooth_min},
     surface_net::{Grid, surface_net},
     vectors::norm,
 };
@@ -35,7 +35,7 @@ fn solid(p: [f64; 3]) -> f64 {
     const REACH: f64 = 0.04;
     let leg = distance([p[0].abs(), p[1], p[2].abs()], &LEG);
     let plates = PLATES.iter().map(|plate| plate_distance(p, plate));
-    plates.fold(leg, |a, b| joined(a, b, REACH))
+    plates.fold(leg, |a, b| smooth_min(a, b, REACH))
 }
 
 fn plate_distance(p: [f64; 3], (centre, half): &Plate) -> f64 {

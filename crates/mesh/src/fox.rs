@@ -2,7 +2,7 @@
 
 use crate::{
     Mesh,
-    stroke::{Stroke, distance, joined, rounded},
+    stroke::{Stroke, distance, rounded, smooth_min},
     surface_net::{Grid, surface_net},
     vectors::{difference, norm},
 };
@@ -88,7 +88,7 @@ fn solid(p: [f64; 3]) -> f64 {
     let mirrored = [p[0].abs(), p[1], p[2]];
     let single = SINGLE.iter().map(|stroke| distance(p, stroke));
     let paired = PAIRED.iter().map(|stroke| distance(mirrored, stroke));
-    single.chain(paired).fold(f64::INFINITY, |a, b| joined(a, b, REACH))
+    single.chain(paired).fold(f64::INFINITY, |a, b| smooth_min(a, b, REACH))
 }
 
 #[cfg(test)]

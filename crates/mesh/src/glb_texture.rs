@@ -9,13 +9,13 @@ use serde_json::Value;
 
 use crate::{
     Material, Texture,
-    beside::{beside_uri, picture_at},
     error::{FARTHEST, Trouble, shown},
     glb_parts::{factor_of, picture_of},
     gltf::{Gltf, Primitive, entry, number},
     gltf_buffers::data,
     material::media_type,
     pictures::Pictures,
+    referenced::{picture_at, referenced_uri},
     texture::is_near,
 };
 
@@ -197,7 +197,7 @@ fn content(gltf: &Gltf, folder: &Path, image: usize) -> Result<Vec<u8>, Trouble>
         (Value::String(uri), _) => match data(uri) {
             Some(Some(content)) => content,
             Some(None) => return wrong(&format!("its data URI is not base64: {}", shown(uri))),
-            None => return picture_at(beside_uri(folder, uri)).map_err(Trouble::OtherFile),
+            None => return picture_at(referenced_uri(folder, uri)).map_err(Trouble::OtherFile),
         },
         (_, Some(view)) => match gltf.view(view) {
             Ok((_, Some(bytes))) => bytes.to_vec(),

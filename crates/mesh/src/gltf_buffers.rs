@@ -12,9 +12,9 @@ use base64::{
 };
 
 use crate::{
-    beside::{MOST_BYTES, beside_uri},
     bounded::read_bounded,
     error::shown,
+    referenced::{MOST_BYTES, referenced_uri},
 };
 
 /// The bytes of a buffer: the binary chunk, or others, which several buffers may share.
@@ -47,7 +47,7 @@ impl Files {
             return Err("lies in another file: export it as one .glb file".to_owned());
         };
         let Self { read, length } = self;
-        let path = beside_uri(folder, uri);
+        let path = referenced_uri(folder, uri);
         let content = read.entry(path).or_insert_with_key(|path| {
             let most = MOST_BYTES - *length as u64;
             let content = read_bounded(path, most).map_err(|reason| {

@@ -13,7 +13,6 @@
 //! ```
 
 mod airplane;
-mod beside;
 mod bounded;
 mod chair;
 mod cluster;
@@ -45,6 +44,7 @@ mod ply;
 mod ply_header;
 mod polygon;
 mod read;
+mod referenced;
 mod remesh;
 mod separated;
 mod solid;

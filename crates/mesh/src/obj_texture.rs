@@ -7,11 +7,11 @@ use std::{
 
 use crate::{
     Fault, Material, Texture,
-    beside::{beside, picture, read},
     corner::absolute,
     error::{FARTHEST, Trouble, shown},
     material::to_linear,
     pictures::Pictures,
+    referenced::{picture, read, referenced_path},
     statements::{Statement, count, statements},
     texture::is_near,
 };
@@ -242,7 +242,7 @@ fn add<T: PartialEq>(list: &mut Vec<T>, entry: T) {
 
 /// The names of the libraries in the text after `mtllib`: one name, or several that end in `.mtl`, all of which may contain spaces.
 fn names(folder: &Path, text: &str) -> Vec<String> {
-    let exists = |name: &str| beside(folder, name).is_file();
+    let exists = |name: &str| referenced_path(folder, name).is_file();
     let words: Vec<&str> = text.split(' ').take(MOST_LIBRARIES + 1).collect();
     if words.len() == 1 || exists(text) {
         return vec![text.to_owned()];
@@ -286,7 +286,7 @@ fn looks(found: &Found, folder: &Path, warnings: &mut Vec<Trouble>) -> (Vec<Look
     let mut paths = Vec::new();
     for name in found.libraries.iter().flat_map(|text| names(folder, text)) {
         if paths.len() <= MOST_LIBRARIES {
-            add(&mut paths, beside(folder, &name));
+            add(&mut paths, referenced_path(folder, &name));
         }
     }
     if paths.len() > MOST_LIBRARIES {

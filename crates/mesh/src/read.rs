@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crate::{
-    Mesh, MeshError, beside, bounded::open_regular, format::Format, glb, obj, off, parts::Parts,
-    ply, stl,
+    Mesh, MeshError, bounded::open_regular, format::Format, glb, obj, off, parts::Parts, ply,
+    referenced, stl,
 };
 
 impl Mesh {
@@ -133,7 +133,7 @@ fn opened(path: &Path) -> Result<(Vec<u8>, String, Format), MeshError> {
     open_regular(path).map_err(|reason| MeshError::Read { path: path.into(), reason })?;
     // The extension is checked before the file is read: it may be a large video.
     let format = format_of(path, &name)?;
-    Ok((beside::read(path)?, name, format))
+    Ok((referenced::read(path)?, name, format))
 }
 
 fn folder_of(path: &Path) -> &Path {

@@ -14,7 +14,7 @@ pub(crate) fn distance(p: [f64; 3], &(from, from_radius, to, to_radius): &Stroke
 }
 
 /// The smaller of two distances, with the crease between them smoothed over about `reach`.
-pub(crate) fn joined(a: f64, b: f64, reach: f64) -> f64 {
+pub(crate) fn smooth_min(a: f64, b: f64, reach: f64) -> f64 {
     let near = (reach - (a - b).abs()).max(0.0);
     a.min(b) - near * near / (4.0 * reach)
 }
@@ -40,7 +40,7 @@ mod tests {
 
     #[test]
     fn a_joint_fills_the_crease_alone() {
-        assert_eq!(joined(0.3, 0.1, 0.1), 0.1);
-        assert!(joined(0.1, 0.1, 0.1) < 0.1);
+        assert_eq!(smooth_min(0.3, 0.1, 0.1), 0.1);
+        assert!(smooth_min(0.1, 0.1, 0.1) < 0.1);
     }
 }

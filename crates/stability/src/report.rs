@@ -18,7 +18,7 @@ const LEAST: f64 = 1e-9;
 /// The matrix and all its levels as one self-contained page.
 pub(crate) fn html(matrix: &Matrix, command: &str) -> anyhow::Result<String> {
     let mut report = Report::new("stability", ABOUT);
-    report.paragraph(&ended(matrix));
+    report.paragraph(&counts(matrix));
     report.warnings(&matrix.faults());
     report.heading("Matrix");
     report.paragraph(READING);
@@ -45,12 +45,12 @@ pub(crate) fn html(matrix: &Matrix, command: &str) -> anyhow::Result<String> {
 /// The matrix for a terminal.
 pub(crate) fn lines(matrix: &Matrix) -> Vec<String> {
     let mut lines = table(matrix, false).lines();
-    lines.push(ended(matrix));
+    lines.push(counts(matrix));
     lines.extend(matrix.faults());
     lines
 }
 
-fn ended(matrix: &Matrix) -> String {
+fn counts(matrix: &Matrix) -> String {
     let Matrix { methods, rows, trials, non_finite, seconds } = matrix;
     let (cases, methods) = (rows.len(), methods.len());
     format!(

@@ -31,7 +31,7 @@ pub(super) const CASES: &[Case] = &[
         perturbation: "gap between the two, 0.01 to 1 of the distance between the planes",
         measure: "1 unless the loss falls as the hidden square comes nearer",
         target: "0",
-        run: felt,
+        run: gradient_of_depth,
     },
     Case {
         id: "O33",
@@ -93,7 +93,7 @@ fn hidden(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     })
 }
 
-fn felt(tested: &Tested) -> anyhow::Result<Vec<Level>> {
+fn gradient_of_depth(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     levels(GAPS, |gap: f64| {
         let [share, gradient] = two_squares(tested, gap);
         let by_depth: f64 = (4..8).map(|corner| gradient[3 * corner + 2]).sum();

@@ -7,7 +7,7 @@ use softrast_mesh::{Mesh, Texture, from_linear, to_linear};
 
 use super::{
     pictures::Pictures,
-    texels::{Bounds, between, bounds, from, joined, repeated, shifted, size, texels, texels_in},
+    texels::{Bounds, between, bounds, from, repeated, shifted, size, texels, texels_in, union},
 };
 
 /// Colour and factor that change nothing.
@@ -42,7 +42,7 @@ pub(super) struct Layout {
 }
 
 /// Positions of patches.
-pub(super) struct Placed {
+pub(super) struct Packed {
     pub(super) width: usize,
     pub(super) height: usize,
     at: Vec<[usize; 2]>,
@@ -114,7 +114,7 @@ impl Layout {
             let Some(picture) = pictures.of_material(number as usize) else { continue };
             let own = bounds(shifted(uv.map(|uv| texels(uv, picture)), picture));
             let (around, sum) = all[number as usize].get_or_insert((own, 0.0));
-            *around = joined(*around, own);
+            *around = union(*around, own);
             *sum += texels_in(own);
         }
         let mut add = |(number, found): (usize, Option<(Bounds, f64)>)| {
@@ -127,7 +127,7 @@ impl Layout {
     }
 
     /// Packs patches on shelves, the highest first.
-    pub(super) fn placed(&self) -> Placed {
+    pub(super) fn packed(&self) -> Packed {
         let mut order = Vec::from_iter(0..self.patches.len());
         order.sort_by_key(|&k| std::cmp::Reverse(self.patches[k].size[1]));
         let texels: f64 =
@@ -145,18 +145,18 @@ impl Layout {
             shelf = shelf.max(high);
             x += wide;
         }
-        Placed { width, height: (y + shelf).max(1), at }
+        Packed { width, height: (y + shelf).max(1), at }
     }
 
     /// The picture.
     pub(super) fn drawn(
         &self,
-        placed: &Placed,
+        packed: &Packed,
         texture: &Texture,
         pictures: &Pictures,
     ) -> RgbImage {
-        let mut picture = RgbImage::new(placed.width as u32, placed.height as u32);
-        for (patch, &[left, top]) in self.patches.iter().zip(&placed.at) {
+        let mut picture = RgbImage::new(packed.width as u32, packed.height as u32);
+        for (patch, &[left, top]) in self.patches.iter().zip(&packed.at) {
             for y in 0..patch.size[1] {
                 for x in 0..patch.size[0] {
                     let colour = patch.texel([x, y], texture, pictures);
@@ -168,10 +168,10 @@ impl Layout {
     }
 
     /// The (u, v) of the corners of all faces, and for each face three indices into them.
-    pub(super) fn coordinates(&self, placed: &Placed) -> (Vec<[f64; 2]>, Vec<[u32; 3]>) {
-        let [width, height] = [placed.width, placed.height].map(|side| side as f64);
+    pub(super) fn coordinates(&self, packed: &Packed) -> (Vec<[f64; 2]>, Vec<[u32; 3]>) {
+        let [width, height] = [packed.width, packed.height].map(|side| side as f64);
         let place = |&(patch, corners): &(usize, [[f64; 2]; 3])| {
-            let [left, top] = placed.at[patch].map(|k| k as f64);
+            let [left, top] = packed.at[patch].map(|k| k as f64);
             corners.map(|[x, y]| [(left + x) / width, 1.0 - (top + y) / height])
         };
         let corners = (0..self.faces.len() as u32).map(|face| [0, 1, 2].map(|k| 3 * face + k));

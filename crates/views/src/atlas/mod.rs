@@ -68,11 +68,11 @@ impl Atlas {
         }
         for _ in 0..MOST_ROUNDS {
             let layout = Layout::of(mesh, texture, &pictures);
-            let placed = layout.placed();
-            let texels = placed.width as f64 * placed.height as f64;
+            let packed = layout.packed();
+            let texels = packed.width as f64 * packed.height as f64;
             if texels <= most as f64 {
-                let (coordinates, corners) = layout.coordinates(&placed);
-                let picture = layout.drawn(&placed, texture, &pictures);
+                let (coordinates, corners) = layout.coordinates(&packed);
+                let picture = layout.drawn(&packed, texture, &pictures);
                 return (Some(Self { coordinates, corners, picture }), errors);
             }
             // Margins do not shrink with the pictures.

@@ -34,7 +34,7 @@ pub(super) fn bounds(corners: [[f64; 2]; 3]) -> Bounds {
     ]
 }
 
-pub(super) fn joined([low, high]: [[i64; 2]; 2], other: [[i64; 2]; 2]) -> [[i64; 2]; 2] {
+pub(super) fn union([low, high]: [[i64; 2]; 2], other: [[i64; 2]; 2]) -> [[i64; 2]; 2] {
     [[0, 1].map(|k| low[k].min(other[0][k])), [0, 1].map(|k| high[k].max(other[1][k]))]
 }
 

@@ -1,4 +1,4 @@
-//! Files next to a mesh: materials and pictures.
+//! Files that a mesh file refers to: materials and pictures.
 
 use std::{
     io,
@@ -11,7 +11,7 @@ use crate::{MeshError, bounded::read_bounded, material::media_type};
 ///
 /// No file outside of the folder is opened: if a path leads out of it, only its last component is used, in the folder itself. A path from
 /// the machine on which a mesh was made is therefore harmless.
-pub(crate) fn beside(folder: &Path, name: &str) -> PathBuf {
+pub(crate) fn referenced_path(folder: &Path, name: &str) -> PathBuf {
     let parts: Vec<&str> = name.split(['/', '\\']).filter(|part| *part != ".").collect();
     let inside = |part: &&str| !(part.is_empty() || part.contains(':') || **part == *"..");
     let kept = if parts.iter().all(inside) { &parts[..] } else { &parts[parts.len() - 1..] };
@@ -27,9 +27,9 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
 }
 
 /// Path of the file that a URI in a file in `folder` refers to: `%20` stands for a space, but not all programs encode it.
-pub(crate) fn beside_uri(folder: &Path, uri: &str) -> PathBuf {
-    let plain = beside(folder, uri);
-    if plain.exists() { plain } else { beside(folder, &decoded(uri)) }
+pub(crate) fn referenced_uri(folder: &Path, uri: &str) -> PathBuf {
+    let plain = referenced_path(folder, uri);
+    if plain.exists() { plain } else { referenced_path(folder, &decoded(uri)) }
 }
 
 /// A text with its escapes decoded: `%` and two hexadecimal digits stand for a byte.
@@ -52,7 +52,7 @@ fn decoded(uri: &str) -> String {
 
 /// The content of the picture called `name` in a file in `folder`.
 pub(crate) fn picture(folder: &Path, name: &str) -> Result<Vec<u8>, MeshError> {
-    picture_at(beside(folder, name))
+    picture_at(referenced_path(folder, name))
 }
 
 /// The content of the picture at `path`.
@@ -79,7 +79,7 @@ mod tests {
             ("%2e%2e%2fa.bin", "in/a.bin"),
             ("%2", "in/%2"),
         ] {
-            assert_eq!(beside_uri(Path::new("in"), uri), Path::new(expected), "{uri}");
+            assert_eq!(referenced_uri(Path::new("in"), uri), Path::new(expected), "{uri}");
         }
     }
 
@@ -96,7 +96,7 @@ mod tests {
             ("..", "in/"),
             ("", "in/"),
         ] {
-            assert_eq!(beside(Path::new("in"), name), Path::new(expected), "{name}");
+            assert_eq!(referenced_path(Path::new("in"), name), Path::new(expected), "{name}");
         }
     }
 }
