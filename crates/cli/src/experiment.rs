@@ -53,8 +53,8 @@ impl<T: Task> TaskExperiment<T> {
             Some(SoftnessChoice::Family(family)) => Some(family),
             _ => None,
         };
-        let shipped = method_args.shipped(T::NAME, preset_by_default).map(|shipped| shipped.name);
-        let edges = EdgeChoice { family, shipped, schedule: method_args.schedule };
+        let bundled = method_args.bundled(T::NAME, preset_by_default).map(|bundled| bundled.name);
+        let edges = EdgeChoice { family, bundled, schedule: method_args.schedule };
         let task = T::new(args, common.variant, &edges)?;
         let mut method = method_args.method(T::NAME, &T::SCALES, preset_by_default)?;
         if !T::MOVES_EDGES {
@@ -363,7 +363,7 @@ impl Solved {
 
 fn reject_moving_edge_flags(method: &MethodArgs) -> anyhow::Result<()> {
     let given = [
-        (method.resolution.is_some_and(|asked| asked != Resolution::Full), "--resolution"),
+        (method.resolution.is_some_and(|given| given != Resolution::Full), "--resolution"),
         (method.tolerance.is_some(), "--tolerance"),
         (method.surrogate_scale.is_some(), "--surrogate-scale"),
     ];

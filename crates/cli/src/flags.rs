@@ -258,7 +258,7 @@ impl MethodArgs {
     /// where a scale may mean another width; its resolution and tolerance default to those of the first. A family also
     /// takes the learning rate of the first and its end; a file brings its own rate.
     #[must_use]
-    pub fn beside(self, first: &Self) -> Self {
+    pub fn with_defaults_of(self, first: &Self) -> Self {
         let is_family = matches!(self.softness, None | Some(SoftnessChoice::Family(_)));
         Self {
             learning_rate: self.learning_rate.or(first.learning_rate.filter(|_| is_family)),
@@ -284,7 +284,7 @@ impl MethodArgs {
     }
 
     /// The requested schedule: a scale without a schedule is fixed.
-    pub(crate) fn asked_schedule(&self) -> Option<Schedule> {
+    pub(crate) fn given_schedule(&self) -> Option<Schedule> {
         self.schedule.or(self.scale.map(|_| Schedule::Static))
     }
 
@@ -310,17 +310,17 @@ mod tests {
             "exp --scale 0.1 --surrogate-scale 1 --learning-rate 0.3 --rate-end 0.1",
         );
         let first = first.unwrap();
-        let second = MethodArgs::parse("gauss").unwrap().beside(&first);
+        let second = MethodArgs::parse("gauss").unwrap().with_defaults_of(&first);
         assert_eq!(second.softness, Some(SoftnessChoice::Family(Family::Gauss)));
         assert_eq!((second.scale, second.surrogate_scale), (None, None));
         assert_eq!(second.learning_rate, Some(0.3));
         // A file or bundled softness keeps its own learning rate.
         for name in ["preset", "learned.json"] {
-            let own = MethodArgs::parse(name).unwrap().beside(&first);
+            let own = MethodArgs::parse(name).unwrap().with_defaults_of(&first);
             assert_eq!((own.learning_rate, own.rate_end), (None, None), "{name}");
         }
         let second = MethodArgs::parse("mlp --scale-end 1e-3 --learning-rate 2").unwrap();
-        let second = second.beside(&first);
+        let second = second.with_defaults_of(&first);
         assert_eq!((second.scale_end, second.learning_rate), (Some(1e-3), Some(2.0)));
         assert_eq!(second.schedule, Some(Schedule::Decay));
     }

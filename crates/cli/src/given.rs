@@ -143,7 +143,7 @@ pub struct MaskFlags {
 
 impl MaskFlags {
     /// Whether the command line has a flag of masks.
-    pub fn asked(&self) -> bool {
+    pub fn is_given(&self) -> bool {
         let Self { invert, threshold, label, masks } = self;
         *invert || threshold.is_some() || label.is_some() || masks.is_some()
     }

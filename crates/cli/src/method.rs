@@ -43,19 +43,22 @@ impl MethodArgs {
             }
             Some(SoftnessChoice::File(file)) => {
                 self.check_goes_with_file()?;
-                (file.display().to_string(), self.of_file(ScheduledSoftness::load(file)?, task)?)
+                (
+                    file.display().to_string(),
+                    self.file_softness(ScheduledSoftness::load(file)?, task)?,
+                )
             }
-            _ => match self.shipped(task, preset_by_default) {
-                Some(Shipped { called, file, .. }) => {
+            _ => match self.bundled(task, preset_by_default) {
+                Some(Bundled { flag, file, .. }) => {
                     self.check_goes_with_file()?;
                     let file = file.map_err(|_| {
                         Error::usage(format!(
-                            "no softness {called} comes with the program for {task}: name a family or a file"
+                            "no softness {flag} is bundled for {task}: name a family or a file"
                         ))
                     })?;
-                    (called, self.of_file(file, task)?)
+                    (flag, self.file_softness(file, task)?)
                 }
-                None => self.of_family(task, scales)?,
+                None => self.family_softness(task, scales)?,
             },
         };
         let (resolution, tolerance) = (self.resolution.unwrap_or_default(), self.tolerance);
@@ -76,7 +79,11 @@ impl MethodArgs {
     }
 
     /// The softness of a file, with its learning rate if that is for this task.
-    fn of_file(&self, file: ScheduledSoftness, task: &str) -> anyhow::Result<ScheduledSoftness> {
+    fn file_softness(
+        &self,
+        file: ScheduledSoftness,
+        task: &str,
+    ) -> anyhow::Result<ScheduledSoftness> {
         let suits = file.task.as_ref().is_none_or(|learned_on| learned_on == task);
         if file.adaptive.is_some() && self.rate_end.is_some() {
             return Err(Error::usage(
@@ -96,7 +103,7 @@ impl MethodArgs {
     }
 
     /// The softness of a family, and its name.
-    fn of_family(
+    fn family_softness(
         &self,
         task: &str,
         scales: &Scales,
@@ -113,7 +120,7 @@ impl MethodArgs {
         let fitted = self.init == Some(Init::Fitted);
         let like = if fitted { Family::Logistic } else { family };
         // Found together, therefore used together or not at all.
-        let searched = Searched::of(task, like.name(), self.asked_schedule(), scales.schedule);
+        let searched = Searched::of(task, like.name(), self.given_schedule(), scales.schedule);
         let searched = searched.filter(|_| !self.is_scaled());
         let [first, last] =
             self.scales(&searched.map_or(*scales, |searched| scales.with(searched)));
@@ -145,7 +152,7 @@ impl MethodArgs {
     /// First and last scale.
     fn scales(&self, usual: &Scales) -> [f64; 2] {
         let unit = |scale: f64| if self.squared { scale * scale } else { scale };
-        match self.asked_schedule().unwrap_or(usual.schedule) {
+        match self.given_schedule().unwrap_or(usual.schedule) {
             Schedule::Static => [self.scale.unwrap_or(unit(usual.fixed)); 2],
             Schedule::Decay => {
                 let [first, last] = usual.decay.map(unit);
@@ -183,9 +190,9 @@ impl Scales {
 }
 
 /// A bundled softness, or the error that there is none.
-pub(crate) struct Shipped {
+pub(crate) struct Bundled {
     /// Its name in the flags.
-    called: String,
+    flag: String,
     /// The name of a task's own bundled softness that goes with it.
     pub(crate) name: String,
     file: Result<ScheduledSoftness, SoftnessFileError>,
@@ -194,23 +201,23 @@ pub(crate) struct Shipped {
 impl MethodArgs {
     /// The bundled softness of these flags, whether it exists or not: the named one, or the preset
     /// if no flag of the softness is given, the task has a preset, and `preset_by_default`.
-    pub(crate) fn shipped(&self, task: &str, preset_by_default: bool) -> Option<Shipped> {
-        let preset = |called: &SoftnessChoice| Shipped {
-            called: called.to_string(),
+    pub(crate) fn bundled(&self, task: &str, preset_by_default: bool) -> Option<Bundled> {
+        let preset = |choice: &SoftnessChoice| Bundled {
+            flag: choice.to_string(),
             name: PRESET.to_owned(),
             file: ScheduledSoftness::preset(task),
         };
         match &self.softness {
             Some(choice @ SoftnessChoice::Preset) => Some(preset(choice)),
-            Some(choice @ SoftnessChoice::Searched) => Some(Shipped {
-                called: choice.to_string(),
+            Some(choice @ SoftnessChoice::Searched) => Some(Bundled {
+                flag: choice.to_string(),
                 name: PRESET.to_owned(),
                 file: ScheduledSoftness::searched(task),
             }),
             Some(choice @ SoftnessChoice::Learned(kind)) => {
                 let name = kind.as_ref().map_or(task.to_owned(), |kind| learned_kind(task, kind));
                 let file = ScheduledSoftness::learned(&name);
-                Some(Shipped { called: choice.to_string(), name, file })
+                Some(Bundled { flag: choice.to_string(), name, file })
             }
             Some(_) => None,
             None => {
@@ -268,8 +275,8 @@ mod tests {
     /// First, middle and last scale of the method of a line.
     fn assert_scales(line: &str, expected: [f64; 3]) {
         let softness = method(line).unwrap().softness;
-        for (part, expected) in [0.0, 0.5, 1.0].into_iter().zip(expected) {
-            let found = softness.scale_at(part, 64);
+        for (progress, expected) in [0.0, 0.5, 1.0].into_iter().zip(expected) {
+            let found = softness.scale_at(progress, 64);
             assert!((found / expected - 1.0).abs() < 1e-6, "{line}: {found}, not {expected}");
         }
     }
@@ -291,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_with_the_program_is_used_where_nothing_is_said_and_something_is_solved() {
+    fn the_preset_is_the_default_where_something_is_solved() {
         let silent = MethodArgs::default();
         let name =
             |args: &MethodArgs, task, default| args.method(task, &SCALES, default).unwrap().name;
@@ -329,8 +336,8 @@ mod tests {
     fn a_surrogate_is_the_same_family_and_keeps_its_ratio() {
         let method = method("exp --scale 0.1 --scale-end 0.001 --surrogate-scale 0.3").unwrap();
         assert_eq!(method.name, "exp with surrogate");
-        for (part, scale) in [(0.0, 0.3), (1.0, 0.003)] {
-            let Surrogate { softness, phi } = method.softness.surrogate_at(part, 64).unwrap();
+        for (progress, scale) in [(0.0, 0.3), (1.0, 0.003)] {
+            let Surrogate { softness, phi } = method.softness.surrogate_at(progress, 64).unwrap();
             assert_eq!(softness.family, Family::Exp);
             assert!((softness.scale(&phi) / scale - 1.0).abs() < 1e-9);
         }
@@ -361,9 +368,9 @@ mod tests {
     #[test]
     fn a_learned_softness_that_is_not_there_or_not_alone_is_refused() {
         for (line, part) in [
-            ("learned", "no softness learned comes with the program for"),
-            ("learned-x", "no softness learned-x comes"),
-            ("preset", "no softness preset comes"),
+            ("learned", "no softness learned is bundled for"),
+            ("learned-x", "no softness learned-x is bundled"),
+            ("preset", "no softness preset is bundled"),
             ("learned-pose --scale 0.1", "holds its own parameters"),
             ("auto", "goes with solve and evaluate"),
         ] {

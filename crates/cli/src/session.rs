@@ -9,7 +9,7 @@ use softrast_lab::{
     shown,
 };
 
-use crate::{command_line::Kept, commands::ended};
+use crate::{command_line::Kept, commands::with_resume_hint};
 
 /// The context of a command, apart from its flags.
 pub(crate) struct Session {
@@ -55,7 +55,7 @@ impl Session {
     pub(crate) fn part(&self, runner: &mut Runner, job: &[Work<'_>]) -> anyhow::Result<Output> {
         let shard = runner.store.shard().map(|shard| shard.to_string()).unwrap_or_default();
         let part = runner.part(job);
-        let part = part.map_err(|error| ended(error, runner.store.kept()))?;
+        let part = part.map_err(|error| with_resume_hint(error, runner.store.kept()))?;
         let json = json!({
             "task": self.task, "command": self.command, "out": shown(&self.out), "shard": shard, "finished": part.finished,
         });

@@ -171,7 +171,7 @@ pub struct EdgeChoice {
     /// A family.
     pub family: Option<Family>,
     /// Name of the requested bundled softness; [`PRESET`](crate::PRESET) for the preset of the task.
-    pub shipped: Option<String>,
+    pub bundled: Option<String>,
     /// The requested schedule of its scale.
     pub schedule: Option<Schedule>,
 }

@@ -98,7 +98,7 @@ impl Runner {
             reasons.push(Reason::new(flags, with, errors, tried.seconds_per_run()));
             answers.push(answer);
         }
-        let selection = Selection::among(of, reasons);
+        let selection = Selection::select(of, reasons);
         Ok(selection.map(|selection| (answers.swap_remove(selection.chosen), selection)))
     }
 }
@@ -113,19 +113,19 @@ impl Reason {
 
 impl Selection {
     /// Selects among answers in ascending cost; `None` if no answer has only finite errors.
-    fn among(of: &'static str, mut reasons: Vec<Reason>) -> Option<Self> {
+    fn select(of: &'static str, mut reasons: Vec<Reason>) -> Option<Self> {
         let finite = reasons.iter().enumerate().filter_map(|(k, reason)| Some((k, reason.mean?)));
         let (best, _) = finite.reduce(|a, b| if b.1 < a.1 { b } else { a })?;
-        let against: Vec<Option<[f64; 2]>> = reasons
+        let relative: Vec<Option<[f64; 2]>> = reasons
             .iter()
             .map(|reason| difference(&reason.errors, &reasons[best].errors))
             .collect();
-        let as_good = |k: &usize| against[*k].is_some_and(|[above, error]| above <= error);
+        let as_good = |k: &usize| relative[*k].is_some_and(|[above, error]| above <= error);
         let chosen = (0..reasons.len()).find(as_good).unwrap_or(best);
         for (k, reason) in reasons.iter_mut().enumerate() {
-            reason.above_best = against[k].map(|[above, _]| above);
-            reason.standard_error = against[k].map(|[_, error]| error);
-            reason.verdict = match against[k] {
+            reason.above_best = relative[k].map(|[above, _]| above);
+            reason.standard_error = relative[k].map(|[_, error]| error);
+            reason.verdict = match relative[k] {
                 _ if k == chosen => "chosen",
                 None => "not finite",
                 Some(_) if as_good(&k) && k == best => "best, but no simpler",
@@ -165,7 +165,7 @@ pub fn chosen_flags(stages: &[Selection]) -> String {
 }
 
 /// Cost and gain of the choices relative to the best answer to the first question; empty without questions.
-pub fn price(stages: &[Selection]) -> String {
+pub fn cost(stages: &[Selection]) -> String {
     let (Some(first), Some(last)) = (stages.first(), stages.last()) else {
         return String::new();
     };
@@ -184,7 +184,7 @@ pub fn price(stages: &[Selection]) -> String {
 pub fn section(stages: &[Selection], report: &mut Report) {
     report.heading("Chosen");
     report.code(&chosen_flags(stages));
-    report.paragraph(&format!("Its price: {}.", price(stages)));
+    report.paragraph(&format!("Its cost: {}.", cost(stages)));
     report.heading("Reasons");
     stages.iter().for_each(|stage| report.table(&stage.table()));
     report.note(
@@ -215,7 +215,7 @@ mod tests {
     }
 
     fn chosen(reasons: &[Reason]) -> String {
-        Selection::among("softness", reasons.to_vec()).unwrap().answer().flags.clone()
+        Selection::select("softness", reasons.to_vec()).unwrap().answer().flags.clone()
     }
 
     #[test]
@@ -233,7 +233,7 @@ mod tests {
     fn what_is_not_finite_is_never_chosen() {
         let broken = reason("logistic", &[0.0, f64::NAN]);
         assert_eq!(chosen(&[broken.clone(), reason("gauss", &[0.5, 0.6])]), "gauss");
-        assert!(Selection::among("softness", vec![broken]).is_none());
+        assert!(Selection::select("softness", vec![broken]).is_none());
     }
 
     #[test]

@@ -40,11 +40,11 @@ impl Depth {
                     return Err(usage("a depth softness file holds its own parameters"));
                 }
                 let file = DepthSoftnessFile::load(path)?;
-                return Self::of_file(path.display().to_string(), file);
+                return Self::from_file(path.display().to_string(), file);
             }
             Some(NameOrFile::Name(softness)) => *softness,
-            None => match shipped(args, edges) {
-                Some((name, file)) => return Self::of_file(name.to_owned(), file),
+            None => match bundled(args, edges) {
+                Some((name, file)) => return Self::from_file(name.to_owned(), file),
                 None => like_edges(edges),
             },
         };
@@ -61,7 +61,7 @@ impl Depth {
         Self { softness, phi: softness.default_phi(scale), name, scale: Some(scale) }.checked()
     }
 
-    fn of_file(name: String, file: DepthSoftnessFile) -> anyhow::Result<Self> {
+    fn from_file(name: String, file: DepthSoftnessFile) -> anyhow::Result<Self> {
         let DepthSoftnessFile { depth_softness, phi, .. } = file;
         Self { softness: depth_softness, phi, name, scale: None }.checked()
     }
@@ -89,13 +89,13 @@ impl Depth {
 }
 
 /// The depth softness bundled with the edge softness, if that is in use, and its name.
-fn shipped(args: &Args, edges: &EdgeChoice) -> Option<(&'static str, DepthSoftnessFile)> {
-    let name = edges.shipped.as_ref().filter(|_| args.depth_scale.is_none())?;
-    let (called, file) = match name.as_str() {
+fn bundled(args: &Args, edges: &EdgeChoice) -> Option<(&'static str, DepthSoftnessFile)> {
+    let edge_name = edges.bundled.as_ref().filter(|_| args.depth_scale.is_none())?;
+    let (name, file) = match edge_name.as_str() {
         PRESET => (PRESET, DepthSoftnessFile::preset(NAME)),
         name => ("learned", DepthSoftnessFile::learned(name)),
     };
-    Some((called, file.ok()?))
+    Some((name, file.ok()?))
 }
 
 fn like_edges(edges: &EdgeChoice) -> DepthSoftness {

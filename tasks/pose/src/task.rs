@@ -151,7 +151,7 @@ impl Task for Pose {
     type Pictures = Pictures;
 
     fn solve_given(given: &Given<'_, Args>, pictures: &Pictures) -> Option<anyhow::Result<Answer>> {
-        pictures.asked().then(|| solve_pictures(given, pictures))
+        pictures.is_given().then(|| solve_pictures(given, pictures))
     }
 
     fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {

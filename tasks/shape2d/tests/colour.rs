@@ -89,7 +89,7 @@ fn few_triangles_pixels_and_wild_softness_end_with_finite_numbers() {
 fn contradictions_are_usage_errors_and_bad_files_are_not() {
     for (line, code, part) in [
         ("--colour --surrogate-scale 0.1", 2, "leave out --surrogate-scale"),
-        ("--colour --softness learned", 2, "no softness learned comes with the program"),
+        ("--colour --softness learned", 2, "no softness learned is bundled"),
         ("--colour=yes", 2, "--colour"),
         ("--colour --triangles 0", 2, "from 1 to 100000"),
         ("--colour --target missing.png", 1, "cannot read the picture missing.png"),

@@ -8,11 +8,11 @@ use softrast_lab::{
     program::Output,
     report::{Beside, Report},
     seeds,
-    select::{Budget, Candidate, Selection, chosen_flags, price, section},
+    select::{Budget, Candidate, Selection, chosen_flags, cost, section},
 };
 use softrast_softness::Family;
 
-use super::ended;
+use super::with_resume_hint;
 use crate::{
     Detail, Init, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment,
     command_line::{Choose, Shared},
@@ -46,7 +46,7 @@ pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyh
     let training = seeds(TRAINING_SEED, training.search_runs);
     let found = find::<T>(&shared, auto.budget, &training, &mut runner);
     runner.progress.finish();
-    let found = found.map_err(|error| ended(error, runner.store.kept()))?;
+    let found = found.map_err(|error| with_resume_hint(error, runner.store.kept()))?;
     if kept.shard.is_some() {
         return session.part(&mut runner, &[]);
     }
@@ -58,7 +58,7 @@ pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyh
     );
     let mut text = vec![head.clone()];
     text.extend(found.stages.iter().flat_map(|stage| stage.table().lines()));
-    text.extend([line("chosen", &found.flags()), line("price", &found.price())]);
+    text.extend([line("chosen", &found.flags()), line("cost", &found.cost())]);
     let unfinished = "the time budget ended before everything was tried";
     let warnings: Vec<String> = (!found.whole).then(|| unfinished.to_owned()).into_iter().collect();
     let json = json!({
@@ -67,7 +67,7 @@ pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyh
         "training_seed": TRAINING_SEED,
         "training_runs": training.len(),
         "flags": found.flags(),
-        "price": found.price(),
+        "cost": found.cost(),
         "choice": { "stages": found.stages, "whole": found.whole },
         "warnings": warnings,
     });
@@ -158,8 +158,8 @@ impl<A> Found<A> {
         chosen_flags(&self.stages)
     }
 
-    pub(super) fn price(&self) -> String {
-        price(&self.stages)
+    pub(super) fn cost(&self) -> String {
+        cost(&self.stages)
     }
 }
 

@@ -7,8 +7,9 @@ use softrast_lab::{
 
 use super::{
     choose::chosen,
-    ended, in_words,
+    in_words,
     runs::{Finished, write},
+    with_resume_hint,
 };
 use crate::{
     Answer, Given, Purpose, SoftnessChoice, Task, TaskExperiment,
@@ -64,7 +65,7 @@ pub(crate) fn evaluate<T: Task>(
     session.claim(names_of_runs::<T>(true, baseline.is_some()))?;
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Evaluating)?;
     let second = baseline.map(|method| {
-        let method = method.beside(&shared.method);
+        let method = method.with_defaults_of(&shared.method);
         let Shared { args, common, .. } = &shared;
         TaskExperiment::<T>::new(args, common, &method, Purpose::Evaluating)
     });
@@ -95,7 +96,7 @@ fn prepared<T: Task>(
     shared.method.reconcile().map_err(Error::usage)?;
     if shared.method.softness == Some(SoftnessChoice::Auto) {
         let found = chosen::<T>(shared, auto.budget, session)?;
-        say(&format!("--softness auto is {}: {}", found.flags(), found.price()));
+        say(&format!("--softness auto is {}: {}", found.flags(), found.cost()));
         (shared.args, shared.method) = (found.answer.args, found.answer.method);
     }
     TaskExperiment::new(&shared.args, &shared.common, &shared.method, purpose)
@@ -122,7 +123,8 @@ fn run<T: Task>(
     runner.progress.expect(steps);
     let solved = runner.evaluate(&experiments, seeds, true, None);
     runner.progress.finish();
-    let (evaluations, stopped) = solved.map_err(|error| ended(error, runner.store.kept()))?;
+    let (evaluations, stopped) =
+        solved.map_err(|error| with_resume_hint(error, runner.store.kept()))?;
     let finished = Finished { experiment: first, evaluation: &evaluations[0] };
     if finished.evaluation.runs.is_empty() {
         return Err(Error::Interrupted.into());

@@ -30,7 +30,7 @@ fn settings_section(report: &mut Report, settings: [&Map<String, Value>; 2]) {
 }
 
 /// An error that ended the work, with a note on stored runs.
-pub(crate) fn ended(error: anyhow::Error, kept: usize) -> anyhow::Error {
+pub(crate) fn with_resume_hint(error: anyhow::Error, kept: usize) -> anyhow::Error {
     if kept == 0 {
         return error;
     }

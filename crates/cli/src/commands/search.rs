@@ -11,9 +11,9 @@ use softrast_lab::{
 use softrast_softness::Softness;
 
 use super::{
-    ended,
     evaluate::names_of_runs,
     runs::{Finished, write},
+    with_resume_hint,
 };
 use crate::{
     MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment, Variant,
@@ -76,7 +76,7 @@ pub(crate) fn search<T: Task>(
     let mut boxed = |setting: &Setting| Ok(Box::new(make(setting)?) as Box<dyn Experiment>);
     let tried = halving.run(&mut runner, steps, &mut boxed);
     runner.progress.finish();
-    let best = tried.map_err(|error| ended(error, runner.store.kept()))?.clone();
+    let best = tried.map_err(|error| with_resume_hint(error, runner.store.kept()))?.clone();
     halving.best_flags = all_flags(common.variant, method, &space, &best);
     let found = make(&best)?;
     if flags.kept.shard.is_some() {
@@ -135,7 +135,7 @@ fn on_held_out<T: Task>(
     match evaluated {
         Ok((mut evaluations, stopped)) => Ok((evaluations.remove(0), stopped)),
         Err(stopped) if was_interrupted(&stopped) => Ok((Evaluation::default(), true)),
-        Err(failed) => Err(ended(failed, runner.store.kept())),
+        Err(failed) => Err(with_resume_hint(failed, runner.store.kept())),
     }
 }
 
@@ -165,8 +165,8 @@ fn space<T: Task>(
         given => given.to_vec(),
     };
     let axis = |flag, fixed: Option<f64>, values: &[f64]| match fixed {
-        Some(fixed) => SearchAxis::among(flag, &[fixed]),
-        None => SearchAxis::among(flag, values),
+        Some(fixed) => SearchAxis::spanning(flag, &[fixed]),
+        None => SearchAxis::spanning(flag, values),
     };
     let none: &[f64] = &[];
     let ends = if method.schedule == Some(Schedule::Static) { none } else { &around };
@@ -176,7 +176,7 @@ fn space<T: Task>(
     let wider: Vec<f64> =
         around.iter().flat_map(|scale| SURROGATES.map(|ratio| scale * ratio)).collect();
     let wider = if has_surrogate && method.surrogate_scale.is_none() { &wider } else { none };
-    let surrogate = SearchAxis { optional: true, ..SearchAxis::among("surrogate-scale", wider) };
+    let surrogate = SearchAxis { optional: true, ..SearchAxis::spanning("surrogate-scale", wider) };
     // A given rate is fixed unless its end is given too; an adaptive schedule moves the rate itself.
     let stays = method.learning_rate.is_some() || base.method.softness.adaptive.is_some();
     let falls = if stays { none } else { &RATE_ENDS };
@@ -190,7 +190,7 @@ fn space<T: Task>(
             ..axis("rate-end", method.rate_end, falls)
         },
     ];
-    axes.extend(base.task.own_axis(args).map(|own| SearchAxis::among(own.flag, &own.values)));
+    axes.extend(base.task.own_axis(args).map(|own| SearchAxis::spanning(own.flag, &own.values)));
     let space = SearchSpace { axes, valid: is_valid };
     if !space.is_free() {
         return Err(Error::usage(
@@ -213,7 +213,7 @@ fn is_valid(setting: &Setting) -> bool {
 /// They range from one below the narrower of the two to the wider, or two to either side if both
 /// are equal. Neighbours are half a decade apart, as widths in NDC: a decade if `squared` is true.
 fn scales_around(softness: &ScheduledSoftness, size: usize) -> Vec<f64> {
-    let [scale, end] = [0.0, 1.0].map(|part| softness.scale_at(part, size));
+    let [scale, end] = [0.0, 1.0].map(|progress| softness.scale_at(progress, size));
     let ratio = if softness.softness.scale_is_squared() { RATIO * RATIO } else { RATIO };
     let (low, high) = (scale.min(end), scale.max(end));
     let steps = ((high / low).ln() / ratio.ln() - 1e-9).ceil().min(STEPS);

@@ -9,7 +9,7 @@ use softrast_lab::Failure;
 
 use crate::{
     disc::Disc,
-    line::{json as of_text, run_in, solved, timeless},
+    line::{file, json as of_text, run_in, solved, timeless},
 };
 
 const LEARN: &str =
@@ -80,6 +80,64 @@ fn a_finished_run_is_gone_on_from_without_a_step() {
     let again = resumed(checkpoint.as_bytes(), steps.as_bytes()).unwrap();
     assert_eq!(again["best"], expected["best"]);
     assert!(Path::new(expected["files"][0].as_str().unwrap()).ends_with("softness.json"));
+}
+
+#[test]
+fn settings_of_learning_reach_the_result() {
+    let more = "--schedule decay --scale 0.3 --scale-end 0.05 --knots 2 --floor 0.5";
+    let (out, json) = solved::<Disc>(&format!("{LEARN} {more} --outer-steps quarters"));
+    let config = &json["config"];
+    assert_eq!([&config["outer_steps"], &config["floor_px"]], [&json!("quarters"), &json!(0.5)]);
+    let schedule = &file(out.path(), "softness.json")["schedule"];
+    assert_eq!(schedule["floor_px"], 0.5);
+    assert_eq!(schedule["knots"].as_array().unwrap().len(), 2);
+    // The start is validated after fewer steps too, where the ball is farther away.
+    let (_, last) = solved::<Disc>(&format!("{LEARN} {more}"));
+    let start = |json: &Value| json["start_validation_loss"].as_f64().unwrap();
+    assert!(start(&json) != start(&last), "{json}");
+}
+
+#[test]
+fn a_learned_width_is_a_parameter_more() {
+    let line = "learn --updates 1 --steps 1 --batch 1 --validation-runs 1 --size 8 --softness mlp";
+    let parameters = ["ndc", "relative"].map(|input| {
+        solved::<Disc>(&format!("{line} --schedule static --input {input}")).1["parameters"].clone()
+    });
+    assert_eq!(parameters, [json!(56), json!(57)]);
+}
+
+#[test]
+fn learning_ends_when_patience_is_exhausted() {
+    // Steps this large lead away from any useful softness.
+    let line = LEARN.replace("--updates 3", "--updates 9 --outer-rate 3");
+    let steps = |more: &str| solved::<Disc>(&format!("{line} {more}")).1["outer_steps"].clone();
+    assert_eq!([steps(""), steps("--patience 1")], [json!(9), json!(1)]);
+}
+
+#[test]
+fn older_names_of_flags_are_read() {
+    let adaptive = format!("{LEARN} --schedule decay --adaptive");
+    let evaluate = "evaluate --runs 2 --steps 2 --size 8 --baseline gauss";
+    for (line, flag, older) in [
+        (LEARN, "--updates", "--outer"),
+        (&adaptive, "--adaptive", "--feedback"),
+        (evaluate, "--baseline", "--against"),
+    ] {
+        let numbers = [line.to_owned(), line.replace(flag, older)].map(|line| {
+            let (_, mut json) = solved::<Disc>(&line);
+            json.as_object_mut().unwrap().remove("files");
+            timeless(json)
+        });
+        assert_eq!(numbers[0], numbers[1], "{older}");
+        let command = line.split(' ').next().unwrap();
+        let (help, _) = run_in::<Disc>(Path::new("out"), &format!("{command} --help"));
+        let [shows, hides] = [flag, older].map(|name| help.split_whitespace().any(|x| x == name));
+        assert!(shows && !hides, "{help}");
+    }
+    let (_, json) = solved::<Disc>(&adaptive);
+    assert_eq!(json["config"]["adaptive"], true);
+    let (_, wrong) = run_in::<Disc>(Path::new("out"), "solve --outer 3");
+    assert!(wrong.unwrap_err().message.starts_with("--outer goes with learn"));
 }
 
 proptest! {

@@ -175,7 +175,7 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
     let cases = [
         ("frobnicate", 2, "unexpected argument 'frobnicate'"),
         ("--softness sofft", 2, "one of logistic, bilogit, gauss"),
-        ("--softness learned", 2, "no softness learned comes with the program for disc"),
+        ("--softness learned", 2, "no softness learned is bundled for disc"),
         ("--softness none.json", 1, "cannot read softness"),
         ("--variant both", 2, "[possible values: original, transfer]"),
         ("--schedule static --scale-end 0.1", 2, "--schedule decay"),
@@ -198,7 +198,7 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("evaluate --search-runs 3", 2, "--search-runs goes with search, choose"),
         ("search --baseline logistic", 2, "--baseline goes with evaluate"),
         ("evaluate --baseline sofft", 2, "one of logistic, bilogit, gauss"),
-        ("evaluate --baseline learned", 2, "--baseline: no softness learned comes"),
+        ("evaluate --baseline learned", 2, "--baseline: no softness learned is bundled"),
         ("evaluate --scales 1,2", 2, "--scales goes with search"),
         ("search --scales 0.1,0", 2, "positive"),
         ("search --search-runs 0", 2, "from 1"),

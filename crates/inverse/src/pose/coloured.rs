@@ -74,7 +74,7 @@ impl<B: RasterBackend> ColouredViews<B> {
     /// The target image, with its coverage `[views, size, size]`.
     pub fn target(&self, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
         let [views, size, _] = coverage.dims();
-        joined(self.over_black.full().reshape([views, 3, size, size]), coverage)
+        stack_rgba(self.over_black.full().reshape([views, 3, size, size]), coverage)
     }
 
     /// The soft image `[views, 4, side, side]` of the projected mesh `seen` `[views, vertices, 3]`, for cameras at
@@ -89,12 +89,12 @@ impl<B: RasterBackend> ColouredViews<B> {
     ) -> Tensor<B, 4> {
         let colours = self.coat.soft(seen, distance, coverage.dims()[1]);
         let shape = colours.dims();
-        joined(colours * coverage.clone().unsqueeze_dim::<4>(1).expand(shape), coverage)
+        stack_rgba(colours * coverage.clone().unsqueeze_dim::<4>(1).expand(shape), coverage)
     }
 
     /// The hard image `[views, 4, size, size]` of the projected mesh, with its hard `coverage`. It has no gradient.
     pub fn hard_image(&self, seen: Projected<B>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
-        joined(self.coat.hard(seen, coverage.dims()[1]), coverage)
+        stack_rgba(self.coat.hard(seen, coverage.dims()[1]), coverage)
     }
 
     /// [`ColouredViews::loss`] of the hard colours of the projected mesh, on `size` × `size` pixels.
@@ -135,7 +135,7 @@ impl<B: RasterBackend> ColouredViews<B> {
 }
 
 /// Joins colours `[views, 3, side, side]` and coverage `[views, side, side]` to an image.
-fn joined<B: RasterBackend>(colours: Tensor<B, 4>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
+fn stack_rgba<B: RasterBackend>(colours: Tensor<B, 4>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
     Tensor::cat(vec![colours, coverage.unsqueeze_dim(1)], 1)
 }
 

@@ -54,12 +54,9 @@ impl<'a> PoseSearch<'a> {
 
     /// A search for the pose of `mesh`, anywhere and in any unit, under the intrinsics of `lens`:
     /// over all directions and rolls, with the learned softness of POSE.
-    #[allow(
-        clippy::missing_panics_doc,
-        reason = "the softness comes with the crate, which tests read"
-    )]
+    #[allow(clippy::missing_panics_doc, reason = "the softness is bundled, and tests read it")]
     pub fn new(mesh: &'a Mesh, lens: Pinhole) -> Self {
-        let learned = ScheduledSoftness::learned("pose").expect("it comes with the crate");
+        let learned = ScheduledSoftness::learned("pose").expect("it is bundled");
         Self {
             mesh,
             camera: lens,

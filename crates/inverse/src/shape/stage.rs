@@ -145,7 +145,7 @@ impl Stage {
         let colours = self.has_colours.then(|| shape.colours());
         let (numbers, count) = match (halves, colours) {
             (Some(numbers), None) | (None, Some(numbers)) => (numbers, CHANNELS),
-            (Some(halves), Some(colours)) => (beside(&halves, &colours), 2 * CHANNELS),
+            (Some(halves), Some(colours)) => (interleaved(&halves, &colours), 2 * CHANNELS),
             (None, None) => return None,
         };
         let background = self.colours.background(&vec![0.0; count], &Default::default());
@@ -175,7 +175,7 @@ fn triples(numbers: &[f32], width: usize, first: usize) -> Vec<f32> {
 }
 
 /// Rows of three of one list, each followed by a row of the other.
-fn beside(first: &[f32], second: &[f32]) -> Vec<f32> {
+fn interleaved(first: &[f32], second: &[f32]) -> Vec<f32> {
     let rows = first.as_chunks::<CHANNELS>().0.iter().zip(second.as_chunks::<CHANNELS>().0);
     rows.flat_map(|(first, second)| first.iter().chain(second)).copied().collect()
 }

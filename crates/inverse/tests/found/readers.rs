@@ -240,7 +240,7 @@ fn model(bytes: &[u8]) {
 fn softnesses() -> Vec<Vec<u8>> {
     let text = |name| {
         let text = ScheduledSoftness::learned(name).and_then(|softness| softness.text(name));
-        text.expect("a softness that comes along is sound").into_bytes()
+        text.expect("a bundled softness is sound").into_bytes()
     };
     ScheduledSoftness::learned_names().map(text).collect()
 }

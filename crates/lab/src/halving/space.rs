@@ -65,7 +65,7 @@ impl SearchSpace {
 
 impl SearchAxis {
     /// An axis between the smallest and the largest value of a list.
-    pub fn among(flag: &'static str, values: &[f64]) -> Self {
+    pub fn spanning(flag: &'static str, values: &[f64]) -> Self {
         let [low, high] = values
             .iter()
             .fold([f64::INFINITY, 0.0], |[low, high], &x| [f64::min(low, x), f64::max(high, x)]);
@@ -110,10 +110,10 @@ pub(super) mod tests {
     pub(in crate::halving) fn space() -> SearchSpace {
         let optional = |axis| SearchAxis { optional: true, ..axis };
         let axes = vec![
-            SearchAxis::among("scale", &[1.0, 0.01]),
-            optional(SearchAxis::among("scale-end", &[0.01, 1.0])),
-            SearchAxis::among("rate", &[0.3]),
-            SearchAxis::among("none", &[]),
+            SearchAxis::spanning("scale", &[1.0, 0.01]),
+            optional(SearchAxis::spanning("scale-end", &[0.01, 1.0])),
+            SearchAxis::spanning("rate", &[0.3]),
+            SearchAxis::spanning("none", &[]),
         ];
         SearchSpace { axes, valid: |setting| setting[1].is_none() || setting[1] < setting[0] }
     }

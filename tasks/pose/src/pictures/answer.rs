@@ -192,7 +192,7 @@ fn section(
     let best = one.of_file(frame, &one.poses[0]);
     let label = format!("{}: IoU {:.4}", name(&one.path), best.iou);
     let mut pictures = vec![Labelled { picture: png(overlay)?, label }];
-    if let Some(images) = beside(mesh, one) {
+    if let Some(images) = picture_and_mesh(mesh, one) {
         for (image, label) in
             images.into_iter().zip(["The picture, over black", "The mesh in its own colours"])
         {
@@ -286,7 +286,7 @@ fn drawn(mesh: &Mesh, one: &Solved, pose: &FoundPose) -> RgbImage {
 }
 
 /// The colours of a picture, and those of the mesh at its best pose.
-fn beside(mesh: &Mesh, one: &Solved) -> Option<[RgbImage; 2]> {
+fn picture_and_mesh(mesh: &Mesh, one: &Solved) -> Option<[RgbImage; 2]> {
     let view = one.painted.as_ref()?;
     let camera = &one.poses[0].camera;
     let channels = view.over_black();

@@ -54,9 +54,9 @@ pub struct Pictures {
 
 impl Pictures {
     /// Whether a flag names pictures.
-    pub(crate) fn asked(&self) -> bool {
+    pub(crate) fn is_given(&self) -> bool {
         let Self { target, targets, camera, start, masks } = self;
-        [target, targets, camera, start].into_iter().any(Option::is_some) || masks.asked()
+        [target, targets, camera, start].into_iter().any(Option::is_some) || masks.is_given()
     }
 
     fn paths(&self) -> anyhow::Result<Vec<PathBuf>> {

@@ -31,7 +31,7 @@ pub(crate) fn solve_views(
             "--colour takes the colours of pictures: name a folder of them with --views",
         )));
     }
-    if flags.views.is_none() && flags.masks.asked() {
+    if flags.views.is_none() && flags.masks.is_given() {
         return Some(Err(Error::usage(
             "--masks, --invert, --threshold and --label are about pictures: name a folder of them with --views",
         )));
