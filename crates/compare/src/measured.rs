@@ -122,7 +122,7 @@ impl Measured {
     pub fn setting(&self) -> String {
         let size = self.entry.solve.size;
         let [first, last] =
-            [0.0, 1.0].map(|part| plain(self.entry.method.softness.scale_at(part, size)));
+            [0.0, 1.0].map(|progress| plain(self.entry.method.softness.scale_at(progress, size)));
         let scale = if self.moves() {
             format!("scale {first} to {last}")
         } else {

@@ -142,11 +142,11 @@ fn a_network_takes_the_place_of_a_symmetric_softness_and_keeps_its_schedule() {
         let [family, network] = both.map(|method| method.softness);
         assert_eq!(network.softness.family, Family::Mlp);
         for step in [0, 9] {
-            let part = ScaleSchedule::progress(step, STEPS);
-            let width = family.scale_at(part, SIZE);
-            let shown = [&family, &network].map(|of| (of.softness, of.phi_at(part, SIZE)));
+            let progress = ScaleSchedule::progress(step, STEPS);
+            let width = family.scale_at(progress, SIZE);
+            let shown = [&family, &network].map(|of| (of.softness, of.phi_at(progress, SIZE)));
             assert!(off(shown, width) < 0.01, "{line}, step {step}");
-            let surrogates = [&family, &network].map(|of| of.surrogate_at(part, SIZE));
+            let surrogates = [&family, &network].map(|of| of.surrogate_at(progress, SIZE));
             assert_eq!(
                 surrogates.iter().flatten().count(),
                 if line.contains("su") { 2 } else { 0 }

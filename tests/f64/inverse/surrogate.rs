@@ -115,9 +115,9 @@ fn a_renderer_at_a_part_of_a_run_has_both_scales_of_that_part() {
         surrogate: Some(Surrogate { softness: LOGISTIC, phi: LOGISTIC.default_phi(3.0) }),
         ..ScheduledSoftness::constant(LOGISTIC, 1.0)
     };
-    for part in [0.0, 0.3, 1.0] {
-        let moved = moving.renderer_at(part, Rasterizer::new(SIZE), faces());
-        let scale = moving.scale_at(part, SIZE);
+    for progress in [0.0, 0.3, 1.0] {
+        let moved = moving.renderer_at(progress, Rasterizer::new(SIZE), faces());
+        let scale = moving.scale_at(progress, SIZE);
         let by_hand = SoftRenderer::new(&faces(), SIZE, LOGISTIC, scale)
             .with_surrogate(LOGISTIC, 3.0 * scale);
         let [found, expected] = [moved, by_hand].map(|renderer| {
@@ -129,7 +129,7 @@ fn a_renderer_at_a_part_of_a_run_has_both_scales_of_that_part() {
             [image, pulled].concat()
         });
         for (a, b) in found.into_iter().zip(expected) {
-            assert!((a - b).abs() < 1e-4 * (1.0 + b.abs()), "{part}: {a}, not {b}");
+            assert!((a - b).abs() < 1e-4 * (1.0 + b.abs()), "{progress}: {a}, not {b}");
         }
     }
 }

@@ -197,8 +197,8 @@ fn with<T: Task>(of: &str, experiment: &TaskExperiment<T>) -> String {
 
 /// The softness families with fixed and moving scale, at the scales of the task.
 fn softnesses<A: Clone>(now: &Answer<A>) -> Vec<Answer<A>> {
-    let paths = |family| [(family, Schedule::Static), (family, Schedule::Decay)];
-    let mut all: Vec<_> = FAMILIES.into_iter().flat_map(paths).collect();
+    let schedules = |family| [(family, Schedule::Static), (family, Schedule::Decay)];
+    let mut all: Vec<_> = FAMILIES.into_iter().flat_map(schedules).collect();
     // Both fixed families of one parameter come before the moving ones.
     all.swap(1, 2);
     let answer = |(family, schedule): (Family, Schedule)| {
