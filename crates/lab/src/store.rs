@@ -290,6 +290,15 @@ mod tests {
         Piece { values: vec![0.1 + 0.2, -0.0, 1e-300 / 7.0, k as f64] }
     }
 
+    #[test]
+    fn a_run_that_was_stored_with_an_older_name_of_its_restarts_is_read() {
+        let run = r#""run":{"seed":3,"curve":[],"success":true,"step_seconds":[],"begun_again":[2,5],"warnings":[],"broke_at":null}"#;
+        let body = format!(r#"{{"key":"k","name":"gauss",{run},"seconds":1.5,"pictures":null}}"#);
+        let line = format!("{HEAD}{}{MIDDLE}{body}}}", checksum(body.as_bytes()));
+        let Entry { value, .. } = entry::<crate::evaluate::Finished>(line.as_bytes()).unwrap();
+        assert_eq!(value.run.restarts, [2, 5]);
+    }
+
     fn shard(text: &str) -> Shard {
         Shard::parse(text).unwrap()
     }
