@@ -201,6 +201,10 @@ fn starts(reaches: &[Reach], count: usize, size: ImageSize) -> Vec<u32> {
         let done = if last == 0 { 0 } else { until[last - 1] };
         let share = done + (all - done) / (left as i64 + 1);
         let row = until.partition_point(|&until| until <= share);
+        // The nearest row, so that the last bands do not take what all others leave.
+        let above = row.checked_sub(1).map_or(0, |row| until[row]);
+        let row =
+            row + usize::from(until.get(row).is_some_and(|&below| below - share < share - above));
         let row = row.max(last + LEAST_ROWS);
         let most = (last + ROWS).min(size.height - left);
         let least = size.height.saturating_sub(left * ROWS);

@@ -195,6 +195,11 @@ pub(crate) trait Lanes:
     fn bits(mask: Self::Mask) -> u32;
     /// The sum of all lanes, halves first.
     fn sum(self) -> Self::Float;
+    /// The sums of six vectors, each as [`Lanes::sum`] adds it.
+    #[inline(always)]
+    fn sums([a, b, c, d, e, f]: [Self; 6]) -> [Self::Float; 6] {
+        [a.sum(), b.sum(), c.sum(), d.sum(), e.sum(), f.sum()]
+    }
     /// Nearest whole numbers, for numbers in [0, 2^22].
     fn nearest(self) -> Self::Index;
     /// Nearest whole numbers as floats, for numbers in [0, 2^22].

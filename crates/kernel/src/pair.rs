@@ -124,14 +124,11 @@ impl<L: Lanes> CornerSums<L> {
         // From pixels, with y down, to NDC.
         let [right, down] = [-2.0, 2.0].map(|k| L::Float::from_f64(k * half));
         // The first corner gets the remainder.
-        let of_corner = [
-            [sums[0] - sums[2] - sums[4], sums[1] - sums[3] - sums[5]],
-            [sums[2], sums[3]],
-            [sums[4], sums[5]],
-        ];
-        for (&corner, [x, y]) in order.iter().zip(of_corner) {
-            corners[2 * corner] += x.sum() * right;
-            corners[2 * corner + 1] += y.sum() * down;
+        let first = [sums[0] - sums[2] - sums[4], sums[1] - sums[3] - sums[5]];
+        let sums = L::sums([first[0], first[1], sums[2], sums[3], sums[4], sums[5]]);
+        for (&corner, [x, y]) in order.iter().zip(sums.as_chunks().0) {
+            corners[2 * corner] += *x * right;
+            corners[2 * corner + 1] += *y * down;
         }
     }
 }

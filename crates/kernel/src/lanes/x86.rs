@@ -188,6 +188,28 @@ impl Lanes for F32x8 {
         }
     }
 
+    // Two sums per half of a vector, so that one addition serves several of them.
+    #[inline(always)]
+    fn sums(of: [Self; 6]) -> [f32; 6] {
+        unsafe {
+            let four = |a: Self, b: Self| {
+                let low = _mm256_permute2f128_ps::<0x20>(a.0, b.0);
+                _mm256_add_ps(low, _mm256_permute2f128_ps::<0x31>(a.0, b.0))
+            };
+            let two = |a: __m256, b: __m256| {
+                let low = _mm256_shuffle_ps::<0x44>(a, b);
+                _mm256_add_ps(low, _mm256_shuffle_ps::<0xEE>(a, b))
+            };
+            let [a, b, c, d, e, f] = of;
+            let (ab, cd, ef) = (four(a, b), four(c, d), four(e, f));
+            let (first, last) = (two(ab, cd), two(ef, ef));
+            let even = _mm256_shuffle_ps::<0x88>(first, last);
+            let sums = Self(_mm256_add_ps(even, _mm256_shuffle_ps::<0xDD>(first, last)));
+            let [a, c, e, _, b, d, f, _] = sums.array();
+            [a, b, c, d, e, f]
+        }
+    }
+
     #[inline(always)]
     fn nearest(self) -> __m256i {
         unsafe { _mm256_cvtps_epi32(self.0) }
