@@ -22,7 +22,7 @@ impl InverseProblem for Covering {
     type Scene<B: RasterBackend> = Scene<B>;
 
     fn instance(&self, seed: u64) -> anyhow::Result<Instance> {
-        Ok(Instance::seeded(seed, self.triangles))
+        Ok(Instance::seeded(seed, self.triangles, 1))
     }
 
     fn scene<B: RasterBackend>(&self, instances: &[Instance], size: usize) -> Scene<B> {

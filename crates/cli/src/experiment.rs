@@ -3,7 +3,7 @@ use std::rc::Rc;
 use serde_json::{Map, Value, json};
 use softrast_inverse::{Method, Minimization, Resolution, SolveConfig, Surrogate};
 use softrast_lab::{Batch, Error, Experiment, Metric, Pictures, Point, Progress, Run, best_point};
-use softrast_raster::{BackendChoice, HostBackend, RasterBackend, on_backend};
+use softrast_raster::{BackendChoice, HostBackend, ImageSize, RasterBackend, on_backend};
 use softrast_softness::Softness;
 
 use crate::{
@@ -76,7 +76,7 @@ impl<T: Task> TaskExperiment<T> {
         }
         let usual = task.defaults();
         let size = common.size.unwrap_or(usual.size);
-        method.resolution.check(size).map_err(Error::usage)?;
+        method.resolution.check(task.image_size(size)).map_err(Error::usage)?;
         // With an adaptive schedule, the number of steps is tuned to the learning rate.
         let takes = task.takes_learning_rate() || method.softness.adaptive.is_some();
         let of_method = method.softness.learning_rate.filter(|_| takes);
@@ -93,6 +93,11 @@ impl<T: Task> TaskExperiment<T> {
             task: Rc::new(task),
             method,
         })
+    }
+
+    /// Size of the images.
+    pub fn image_size(&self) -> ImageSize {
+        self.task.image_size(self.solve.size)
     }
 
     /// Parameters of the softness, the task's own included.
@@ -219,7 +224,7 @@ impl<T: Task> TaskExperiment<T> {
         image: &[f64],
         frame: bool,
     ) {
-        let size = self.solve.size;
+        let size = self.image_size();
         let step = solved.run.curve.len() - 1;
         let best = best_point(&solved.run.curve, HARD).is_none_or(|best| best.step == step);
         let now = || self.task.picture(image, size);

@@ -2,7 +2,7 @@ use image::RgbImage;
 use serde_json::{Map, Value};
 use softrast_inverse::{InverseProblem, Iterate};
 use softrast_lab::{Metric, Role, plot::Plot, rgb_from_gray};
-use softrast_raster::HostBackend;
+use softrast_raster::{HostBackend, ImageSize};
 use softrast_softness::Family;
 use softrast_tensor::Tensor;
 
@@ -109,8 +109,8 @@ pub trait Task: InverseProblem + Sized {
     fn targets(&self, scene: &Self::Scene<HostBackend>) -> Vec<f64>;
 
     /// An image of an instance as a picture; by default in grey levels.
-    fn picture(&self, image: &[f64], size: usize) -> RgbImage {
-        rgb_from_gray(image, size, size)
+    fn picture(&self, image: &[f64], size: ImageSize) -> RgbImage {
+        rgb_from_gray(image, size.width, size.height)
     }
 
     /// Whether it has a [`drawing`](Task::drawing).
@@ -122,7 +122,7 @@ pub trait Task: InverseProblem + Sized {
     }
 
     /// An image of an instance as a frame of the animation, with its target.
-    fn frame(&self, image: &[f64], _target: &[f64], size: usize) -> RgbImage {
+    fn frame(&self, image: &[f64], _target: &[f64], size: ImageSize) -> RgbImage {
         self.picture(image, size)
     }
 
@@ -240,7 +240,7 @@ pub struct Ended<'a, T: Task> {
     pub instance: &'a T::Instance,
     /// The target hard image.
     pub target: &'a [f64],
-    /// Width and height of the image, in pixels.
+    /// Shorter side of the image, in pixels.
     pub size: usize,
     /// Error of the returned hard image.
     pub hard: f64,

@@ -93,7 +93,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
         let mut latest = self.latest.borrow_mut();
         let kept = latest.take().filter(|renderer| renderer.phi() == phi);
         let renderer = kept.unwrap_or_else(|| {
-            let full = Rasterizer::new(self.solve.size);
+            let full = Rasterizer::new(self.problem.image_size(self.solve.size));
             let rasterizer = Rasterizer { tolerance: self.tolerance, ..full };
             let (layout, faces) = (self.layout.clone(), self.problem.faces());
             ScheduledRenderer::new(layout, phi, rasterizer, Resolution::Full, faces).into()
@@ -168,7 +168,7 @@ fn sharp<P: InverseProblem>(problem: &P, size: usize, config: &LearnConfig) -> S
     let softness = ScheduledSoftness::constant(logistic, pixels * 2.0 / size as f64);
     let layout = PhiLayout::new(softness, problem.own_phi(), 0, size);
     let phi = layout.start();
-    let (rasterizer, faces) = (Rasterizer::new(size), problem.faces());
+    let (rasterizer, faces) = (Rasterizer::new(problem.image_size(size)), problem.faces());
     ScheduledRenderer::new(layout, &phi, rasterizer, Resolution::Full, faces)
 }
 

@@ -1,7 +1,7 @@
 use std::borrow::Borrow;
 
 use anyhow::Context;
-use softrast_raster::{HostBackend, RasterBackend, low_level::Rasterizer};
+use softrast_raster::{HostBackend, ImageSize, RasterBackend, low_level::Rasterizer};
 use softrast_softness::Softness;
 use softrast_tensor::{Autodiff, Backend, Tensor, TensorData, Transaction, numbers};
 
@@ -41,7 +41,7 @@ pub struct Iterate {
 pub(crate) struct Run<P: InverseProblem, B: RasterBackend, R, S> {
     pub(crate) problem: R,
     instances: usize,
-    size: usize,
+    size: ImageSize,
     renderer: ScheduledRenderer<S>,
     pub(crate) scene: P::Scene<Autodiff<B>>,
     /// The scene on the CPU.
@@ -66,11 +66,12 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
     ) -> Self {
         let (problem, size) = (of.borrow(), *size);
         let layout = PhiLayout::new(method.softness.clone(), problem.own_phi(), *steps, size);
-        let rasterizer = Rasterizer { tolerance: method.tolerance(), ..Rasterizer::new(size) };
+        let full = problem.image_size(size);
+        let rasterizer = Rasterizer { tolerance: method.tolerance(), ..Rasterizer::new(full) };
         let (phi, faces) = (layout.start(), problem.faces());
         let renderer = ScheduledRenderer::new(layout, &phi, rasterizer, method.resolution, faces);
         let (scene, host) = (problem.scene(instances, size), problem.scene(instances, size));
-        Self { problem: of, instances: instances.len(), size, renderer, scene, host }
+        Self { problem: of, instances: instances.len(), size: full, renderer, scene, host }
     }
 
     /// Losses at `theta` `[N]`, under the softness at this progress of a run; with the image if `pictures`.
@@ -98,7 +99,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         seen: Seen<B>,
     ) -> anyhow::Result<Iterate> {
         let image = seen.image.map(|image| of_first(image, self.instances));
-        let rows = image.as_ref().map(|image| image.dims()[3]);
+        let drawn = image.as_ref().map(|image| [image.dims()[2], image.dims()[3]]);
         // One round trip to the device for all tensors.
         let read = Transaction::default().register(seen.theta).register(seen.loss.inner());
         let read = read.register(seen.soft_loss);
@@ -106,9 +107,9 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         let mut read = read.execute_async().await?.into_iter();
         let mut next = || read.next().context("fewer tensors were read than were asked for");
         let (theta, loss, soft_loss) = (on_host(next()?), next()?, next()?);
-        let image = rows.map(|side| {
+        let image = drawn.map(|drawn| {
             let pixels: Vec<f64> = next()?.iter().collect();
-            anyhow::Ok(enlarged(&pixels, side, self.size))
+            anyhow::Ok(enlarged(&pixels, drawn.into(), self.size))
         });
         let problem = self.problem.borrow();
         let hard = problem.hard_image(&self.host, theta.clone());
@@ -139,17 +140,15 @@ fn on_host(data: TensorData) -> Tensor<HostBackend, 1> {
     Tensor::from_data(data, (&Default::default(), dtype))
 }
 
-/// Views of `side` × `side` pixels on `size` × `size` pixels: each pixel is repeated. Images of another shape are unchanged.
-fn enlarged(image: &[f64], side: usize, size: usize) -> Vec<f64> {
-    if side >= size {
+/// Views of one size at a multiple of it: each pixel is repeated.
+fn enlarged(image: &[f64], drawn: ImageSize, size: ImageSize) -> Vec<f64> {
+    let times = size.height / drawn.height;
+    if times <= 1 {
         return image.to_vec();
     }
-    // Resolutions divide the size.
-    let times = size / side;
-    let view = |view: &[f64]| -> Vec<f64> {
-        (0..size * size).map(|k| view[k / size / times * side + k % size / times]).collect()
-    };
-    image.chunks(side * side).flat_map(view).collect()
+    let pixel = |k: usize| k / size.width / times * drawn.width + k % size.width / times;
+    let views = image.chunks(drawn.pixels());
+    views.flat_map(|view| (0..size.pixels()).map(move |k| view[pixel(k)])).collect()
 }
 
 #[cfg(test)]
@@ -159,8 +158,8 @@ mod tests {
     #[test]
     fn a_coarse_image_is_enlarged_by_repeating_its_pixels() {
         let (few, many) = ([1.0, 2.0, 3.0, 4.0], [1.0, 1.0, 2.0, 2.0]);
-        assert_eq!(enlarged(&few, 2, 4)[..8], [many, many].concat());
-        assert_eq!(enlarged(&few, 2, 2), few);
-        assert_eq!(enlarged(&[few, few].concat(), 2, 4).len(), 32);
+        assert_eq!(enlarged(&few, 2.into(), 4.into())[..8], [many, many].concat());
+        assert_eq!(enlarged(&few, 2.into(), 2.into()), few);
+        assert_eq!(enlarged(&[few, few].concat(), 2.into(), 4.into()).len(), 32);
     }
 }

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use softrast_meta::Adam;
-use softrast_raster::RasterBackend;
+use softrast_raster::{ImageSize, RasterBackend};
 use softrast_softness::Softness;
 use softrast_tensor::Tensor;
 
@@ -36,7 +36,12 @@ pub trait InverseProblem: 'static {
         None
     }
 
-    /// The scene of these instances, on images of `size` × `size` pixels.
+    /// Height and width of images whose shorter side has `size` pixels; by default squares.
+    fn image_size(&self, size: usize) -> ImageSize {
+        size.into()
+    }
+
+    /// The scene of these instances, on images of [`image_size`](Self::image_size).
     fn scene<B: RasterBackend>(&self, instances: &[Self::Instance], size: usize) -> Self::Scene<B>;
 
     /// Faces of the mesh of the silhouettes, the same in all instances; `None` if edges are drawn differently.
@@ -84,7 +89,7 @@ pub trait InverseProblem: 'static {
         self.image(scene, theta, softness)
     }
 
-    /// The loss of an image `[views, channels, side, side]`, `[instances]`; `side` is the size of the scene, possibly halved repeatedly.
+    /// The loss of an image `[views, channels, height, width]`, `[instances]`; its size is that of the scene, possibly halved repeatedly.
     fn image_loss<B: RasterBackend>(
         &self,
         scene: &Self::Scene<B>,
@@ -122,7 +127,7 @@ pub trait InverseProblem: 'static {
 /// Settings for solving a problem, apart from the method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveConfig {
-    /// Width and height of the image of the hard error, in pixels.
+    /// Shorter side of the image of the hard error, in pixels.
     pub size: usize,
     /// Steps of the optimiser.
     pub steps: usize,

@@ -1,7 +1,7 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use softrast_raster::{
-    ColourRenderer, Projected, RasterBackend, SoftRenderer, Weighting,
+    ColourRenderer, ImageSize, Projected, RasterBackend, SoftRenderer, Weighting,
     low_level::{PixelLoss, Rasterizer},
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Softness};
@@ -39,7 +39,7 @@ pub struct ScheduledRenderer<S = EdgeSoftness> {
     /// The softness if nothing is differentiated with respect to φ.
     values: ScheduledSoftness<S>,
     own: Vec<f64>,
-    size: usize,
+    size: ImageSize,
     tolerance: f64,
     resolution: Resolution,
     /// Renderer of silhouettes, if the problem has any.
@@ -50,11 +50,11 @@ pub struct ScheduledRenderer<S = EdgeSoftness> {
     colours: RefCell<Option<Colours<S>>>,
 }
 
-/// A renderer of colours, the faces that it draws, and pixels a side.
+/// A renderer of colours, the faces that it draws, and the size of its images.
 #[derive(Debug)]
 struct Colours<S> {
     faces: Arc<[[u32; 3]]>,
-    side: usize,
+    size: ImageSize,
     renderer: ColourRenderer<S>,
 }
 
@@ -70,7 +70,7 @@ impl<S: Softness> ScheduledRenderer<S> {
     ) -> Self {
         let (values, own) = layout.softness(phi);
         let renderer = faces.map(|faces| values.renderer_at(0.0, rasterizer, faces));
-        let (size, tolerance) = (rasterizer.size.shorter(), rasterizer.tolerance);
+        let (size, tolerance) = (rasterizer.size, rasterizer.tolerance);
         let phi = phi.to_vec();
         let (placed, colours) = (RefCell::default(), RefCell::default());
         Self { layout, phi, values, own, size, tolerance, resolution, renderer, placed, colours }
@@ -141,9 +141,9 @@ impl<S: Softness> ScheduledRenderer<S> {
         if self.values.is_constant() { 0 } else { progress.to_bits() }
     }
 
-    /// Pixels a side of the image at this progress.
-    fn side(&self, progress: f64) -> usize {
-        self.resolution.side(self.size, self.values.width_at(progress, self.layout.size()))
+    /// Size of the image at this progress.
+    fn size(&self, progress: f64) -> ImageSize {
+        self.resolution.size(self.size, self.values.width_at(progress, self.layout.size()))
     }
 
     /// The renderer of silhouettes at this progress.
@@ -159,7 +159,7 @@ impl<S: Softness> ScheduledRenderer<S> {
             let surrogate = self.values.surrogate_at(progress, size).map(|found| found.phi);
             renderer.with_phi::<B>(self.values.phi_at(progress, size), surrogate)
         });
-        placed.sized(self.side(progress))
+        placed.sized(self.size(progress))
     }
 }
 
@@ -176,8 +176,8 @@ pub struct SoftnessAt<'a, B: RasterBackend, S = EdgeSoftness> {
 }
 
 impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
-    /// Coverage `[views, side, side]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth), with the gradient
-    /// of the surrogate if there is one; the side is the size of the image or less, by the resolution.
+    /// Coverage `[views, height, width]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth), with the gradient
+    /// of the surrogate if there is one, on images of [`size`](Self::size).
     ///
     /// # Panics
     ///
@@ -201,12 +201,12 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     ///
     /// # Panics
     ///
-    /// If the problem has no faces, or there is no target of this many pixels.
+    /// If the problem has no faces, or there is no target of this size.
     pub fn iou_loss(&self, vertices: Projected<B>, targets: &Targets<B>) -> Tensor<B, 1> {
         if self.prepared.is_some() {
             return targets.iou_loss(self.silhouette(vertices));
         }
-        let (target, counted) = targets.at(self.side());
+        let (target, counted) = targets.at(self.size());
         let renderer = self.renderer.silhouettes::<B>(self.progress);
         renderer.weighted_loss(PixelLoss::Iou, vertices, target, counted)
     }
@@ -215,19 +215,19 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     ///
     /// # Panics
     ///
-    /// If the problem has no faces, or there is no target of this many pixels.
+    /// If the problem has no faces, or there is no target of this size.
     pub fn mse_loss(&self, vertices: Projected<B>, targets: &Targets<B>) -> Tensor<B, 1> {
         if self.prepared.is_some() {
             return targets.mse_loss(self.silhouette(vertices));
         }
-        let (target, counted) = targets.at(self.side());
+        let (target, counted) = targets.at(self.size());
         let renderer = self.renderer.silhouettes::<B>(self.progress);
         renderer.weighted_loss(PixelLoss::SquaredError, vertices, target, counted)
     }
 
-    /// Pixels a side of the image.
-    pub fn side(&self) -> usize {
-        self.renderer.side(self.progress)
+    /// Size of the image: that of the problem or smaller, by the resolution.
+    pub fn size(&self) -> ImageSize {
+        self.renderer.size(self.progress)
     }
 
     /// Largest error of a pixel from culling distant faces.
@@ -245,7 +245,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         (layout.edge(), phi)
     }
 
-    /// A renderer of these faces in colours under this softness of edges, on images of [`side`](Self::side) pixels a side.
+    /// A renderer of these faces in colours under this softness of edges, on images of [`size`](Self::size).
     ///
     /// `planes` are the depths of nearness 1 and 0 in world units, `depth_scale` is in units of the distance between them. The tables of
     /// the latest renderer are cached for the next call with equal arguments. [`ColourRenderer::image_with`] passes gradients on to φ,
@@ -261,11 +261,11 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         depth: DepthSoftness,
         depth_scale: f64,
     ) -> ColourRenderer<S> {
-        let ((edge, phi), side) = (self.edge(), self.side());
+        let ((edge, phi), size) = (self.edge(), self.size());
         let phi = [numbers(phi), depth.default_phi(depth_scale)];
         let same = |kept: &Colours<S>| {
             let of = kept.renderer.weighting();
-            let drawn = kept.side == side && kept.faces == *faces;
+            let drawn = kept.size == size && kept.faces == *faces;
             drawn && of.depth == depth && of.planes == planes
         };
         let mut colours = self.renderer.colours.borrow_mut();
@@ -273,12 +273,12 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
             Some(kept) => kept.renderer,
             None => {
                 let weighting = Weighting { edge: edge.clone(), depth, planes };
-                ColourRenderer::with_weighting(faces.clone(), side, weighting, phi.clone())
+                ColourRenderer::with_weighting(faces.clone(), size, weighting, phi.clone())
                     .with_tolerance(self.tolerance())
             }
         };
         renderer.set_phi(phi);
-        colours.insert(Colours { faces: faces.clone(), side, renderer }).renderer.clone()
+        colours.insert(Colours { faces: faces.clone(), size, renderer }).renderer.clone()
     }
 
     /// The problem's own parameters, `[P]`.

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use softrast_raster::{RasterBackend, iou_loss, mse_loss};
+use softrast_raster::{ImageSize, RasterBackend, iou_loss, mse_loss};
 use softrast_tensor::{Backend, Tensor, tensor};
 
 use crate::Resolution;
@@ -22,14 +22,14 @@ use softrast_views::Picture;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Targets<B: Backend> {
-    /// `[views, size, size]`, the largest first.
+    /// `[views, height, width]`, the largest first.
     levels: Vec<Tensor<B, 3>>,
     /// The weight of each pixel, at the same sizes, unless all pixels count in full.
     counted: Option<Vec<Tensor<B, 3>>>,
 }
 
 impl<B: Backend> Targets<B> {
-    /// All sizes of `target` `[views, size, size]`.
+    /// All sizes of `target` `[views, height, width]`.
     pub fn new(target: Tensor<B, 3>) -> Self {
         Self { levels: halves(target), counted: None }
     }
@@ -59,31 +59,33 @@ impl<B: Backend> Targets<B> {
         &self.levels
     }
 
-    /// The target for an `image` `[views, side, side]`.
+    /// The target for an `image` `[views, height, width]`.
     ///
     /// # Panics
     ///
     /// If no size is that of the image.
     pub fn of(&self, image: &Tensor<B, 3>) -> Tensor<B, 3> {
-        self.at(image.dims()[1]).0
+        self.at(size_of(image)).0
     }
 
-    /// The target of `side` pixels a side, and the weight of each pixel, unless all pixels count in
-    /// full; both `[views, side, side]`.
+    /// The target of this size, and the weight of each pixel, unless all pixels count in
+    /// full; both `[views, height, width]`.
     ///
     /// # Panics
     ///
     /// If there is no such size.
-    pub fn at(&self, side: usize) -> (Tensor<B, 3>, Option<Tensor<B, 3>>) {
-        let level = self.levels.iter().position(|level| level.dims()[1] == side);
-        let level = level.unwrap_or_else(|| panic!("there is no target of {side} pixels a side"));
+    pub fn at(&self, size: ImageSize) -> (Tensor<B, 3>, Option<Tensor<B, 3>>) {
+        let level = self.levels.iter().position(|level| size_of(level) == size);
+        let level = level.unwrap_or_else(|| {
+            panic!("there is no target of {} x {} pixels", size.width, size.height)
+        });
         let counted = self.counted.as_ref().map(|counted| counted[level].clone());
         (self.levels[level].clone(), counted)
     }
 }
 
 impl<B: RasterBackend> Targets<B> {
-    /// The [`iou_loss`] `[views]` of an `image` `[views, side, side]`, weighted by pixel.
+    /// The [`iou_loss`] `[views]` of an `image` `[views, height, width]`, weighted by pixel.
     ///
     /// # Panics
     ///
@@ -93,7 +95,7 @@ impl<B: RasterBackend> Targets<B> {
         iou_loss(image, target)
     }
 
-    /// The [`mse_loss`] `[views]` of an `image` `[views, side, side]`, weighted by pixel.
+    /// The [`mse_loss`] `[views]` of an `image` `[views, height, width]`, weighted by pixel.
     ///
     /// # Panics
     ///
@@ -118,17 +120,22 @@ impl<B: RasterBackend> Targets<B> {
     }
 
     fn judged(&self, image: Tensor<B, 3>) -> (Tensor<B, 3>, Tensor<B, 3>) {
-        match self.at(image.dims()[1]) {
+        match self.at(size_of(&image)) {
             (target, Some(counted)) => (image * counted, target),
             (target, None) => (image, target),
         }
     }
 }
 
-/// An image `[views, size, size]` at all sizes, the largest first.
+/// Size of an image `[views, height, width]`.
+fn size_of<B: Backend>(image: &Tensor<B, 3>) -> ImageSize {
+    let [_, height, width] = image.dims();
+    [height, width].into()
+}
+
+/// An image `[views, height, width]` at all sizes, the largest first.
 fn halves<B: Backend>(image: Tensor<B, 3>) -> Vec<Tensor<B, 3>> {
-    let [_, size, _] = image.dims();
-    let smaller = Resolution::sides(size).skip(1);
+    let smaller = Resolution::sizes(size_of(&image)).skip(1);
     smaller.fold(vec![image], |mut levels, _| {
         let next = halved(levels[levels.len() - 1].clone());
         levels.push(next);
@@ -158,12 +165,12 @@ pub(crate) fn parts<'a>(
     parts
 }
 
-/// Means of two by two pixels: `[views, size, size]` to `[views, size / 2, size / 2]`.
+/// Means of two by two pixels: `[views, height, width]` to `[views, height / 2, width / 2]`.
 fn halved<B: Backend>(image: Tensor<B, 3>) -> Tensor<B, 3> {
-    let [views, size, _] = image.dims();
-    let half = size / 2;
-    let across = image.reshape([views, size, half, 2]).mean_dim(3);
-    across.reshape([views, half, 2, half]).mean_dim(2).reshape([views, half, half])
+    let [views, height, width] = image.dims();
+    let (rows, columns) = (height / 2, width / 2);
+    let across = image.reshape([views, height, columns, 2]).mean_dim(3);
+    across.reshape([views, rows, 2, columns]).mean_dim(2).reshape([views, rows, columns])
 }
 
 #[cfg(test)]
@@ -186,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "no target of 2 pixels")]
+    #[should_panic(expected = "no target of 2 x 2 pixels")]
     fn a_size_that_is_no_half_of_a_half_has_no_target() {
         let targets = Targets::new(Tensor::<HostBackend, 3>::zeros([2, 6, 6], &Default::default()));
         let _ = targets.of(&Tensor::zeros([2, 3, 3], &Default::default()));

@@ -11,7 +11,7 @@ use softrast_lab::{
     plot::{Axis, Plot, Series},
     rgb_from_planes,
 };
-use softrast_raster::{HostBackend, RasterBackend};
+use softrast_raster::{HostBackend, ImageSize, RasterBackend};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Tensor, numbers, vector};
 
@@ -224,8 +224,8 @@ impl Task for Occlusion {
         numbers(scene.target())
     }
 
-    fn picture(&self, image: &[f64], size: usize) -> RgbImage {
-        rgb_from_planes(image, size, size)
+    fn picture(&self, image: &[f64], size: ImageSize) -> RgbImage {
+        rgb_from_planes(image, size.width, size.height)
     }
 
     fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {

@@ -11,7 +11,7 @@ use softrast_inverse::{
     pose::{PoseInstance, PoseScene, nearest_distance},
 };
 use softrast_lab::{Error, program::say};
-use softrast_raster::{HostBackend, RasterBackend};
+use softrast_raster::{HostBackend, ImageSize, RasterBackend};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers};
 
@@ -243,7 +243,7 @@ impl Task for Pose {
         numbers(scene.target())
     }
 
-    fn frame(&self, image: &[f64], target: &[f64], size: usize) -> RgbImage {
+    fn frame(&self, image: &[f64], target: &[f64], size: ImageSize) -> RgbImage {
         outlined(self.picture(image, size), target)
     }
 

@@ -10,7 +10,7 @@ pub struct Args {
     #[arg(long)]
     pub colour: bool,
 
-    /// Picture to cover, by its luminance or, with --colour, its colours [default: our logo of the variant, or our landscape]
+    /// Picture to cover, by its luminance or, with --colour, its colours; images keep its proportions [default: our logo of the variant, or our landscape]
     #[arg(long, value_name = "FILE.png")]
     pub target: Option<PathBuf>,
 

@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use softrast_cli::Variant;
+use softrast_raster::ImageSize;
 use softrast_views::Picture;
 
 use crate::Logo;
@@ -40,13 +41,21 @@ impl Target {
         &self.name
     }
 
-    /// The image `[size * size]`, top row first, 0 black to 1 white.
+    /// The size of an image whose shorter side has `size` pixels: with the proportions of a picture, or square.
+    pub(crate) fn image_size(&self, size: usize) -> ImageSize {
+        match &self.source {
+            Source::Logo(_) => size.into(),
+            Source::Picture(picture) => picture.size_at(size),
+        }
+    }
+
+    /// The image whose shorter side has `size` pixels, `[height * width]`, top row first, 0 black to 1 white.
     ///
-    /// The longer side of a picture fills the image; the rest is black. Each pixel is the mean of the picture over its area.
+    /// Each pixel is the mean of a picture over its area.
     pub(crate) fn image(&self, size: usize) -> Vec<f64> {
         match &self.source {
             Source::Logo(logo) => logo.image(size),
-            Source::Picture(picture) => picture.levels(size),
+            Source::Picture(picture) => picture.resized(picture.size_at(size)),
         }
     }
 }

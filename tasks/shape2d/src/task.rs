@@ -6,7 +6,7 @@ use softrast_cli::{
     Scales, Schedule, Task, Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
-use softrast_raster::{HostBackend, RasterBackend};
+use softrast_raster::{HostBackend, ImageSize, RasterBackend};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers};
 
@@ -43,13 +43,17 @@ impl InverseProblem for Shape2d {
     type Scene<B: RasterBackend> = Scene<B>;
 
     fn instance(&self, seed: u64) -> anyhow::Result<Instance> {
-        Ok(Instance::seeded(seed, self.triangles))
+        Ok(Instance::seeded(seed, self.triangles, self.image_size(self.defaults().size)))
+    }
+
+    fn image_size(&self, size: usize) -> ImageSize {
+        self.target.image_size(size)
     }
 
     /// The scene of the single instance.
     fn scene<B: RasterBackend>(&self, instances: &[Instance], size: usize) -> Scene<B> {
         assert_eq!(instances.len(), 1, "a scene has one instance");
-        Scene::new(&self.target(size), &instances[0], size)
+        Scene::new(&self.target(size), &instances[0], self.image_size(size))
     }
 
     fn faces(&self) -> Option<Arc<[[u32; 3]]>> {

@@ -61,6 +61,27 @@ fn a_few_steps_come_nearer_to_our_landscape_and_write_every_file() {
 }
 
 #[test]
+fn a_wide_picture_keeps_its_proportions() {
+    let (folder, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let path = folder.path().join("wide.png");
+    let colour = |x: u32, y: u32| Rgba([(8 * x) as u8, (16 * y) as u8, 90, 255]);
+    RgbaImage::from_fn(30, 12, colour).save(&path).unwrap();
+    let line = format!("--size 24 --triangles 40 --steps 20 --target {}", path.display());
+    let json = run_in(out.path(), &format!("--colour {line}")).unwrap();
+    let of = |key: &str| json["psnr"]["hard"][key].as_f64().unwrap();
+    assert!(of("initial") > 20.0 && of("best") >= of("initial"), "{json}");
+    let svg = fs::read_to_string(out.path().join("result.svg")).unwrap();
+    assert!(svg.contains("viewBox=\"0 0 60 24\""), "{svg}");
+    // Four pictures in a row, with gaps.
+    let picture = image::open(out.path().join("before_after.png")).unwrap();
+    let ratio = f64::from(picture.width()) / f64::from(picture.height());
+    assert!((ratio - 10.0).abs() < 0.5, "{ratio}");
+    assert_finite(&run_in(out.path(), &format!("{line} --resolution 6 --scale 0.1")).unwrap());
+    let wrong = run_in(out.path(), &format!("{line} --resolution 3 --scale 0.1")).unwrap_err();
+    assert!(wrong.to_string().contains("one of 24, 12, 6"), "{wrong}");
+}
+
+#[test]
 fn pictures_without_a_shape_end_with_finite_numbers_and_a_warning() {
     for colour in [[0, 0, 0, 255], [255; 4], [90, 20, 200, 255], [255, 0, 0, 0]] {
         let json = in_colour(|_, _| colour, "--size 8 --triangles 20 --steps 20");

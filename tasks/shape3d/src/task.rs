@@ -10,7 +10,7 @@ use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::{contact_sheet, rgb_from_gray};
 use softrast_mesh::{Mesh, airplane, chair, icosphere};
 use softrast_meta::Adam;
-use softrast_raster::{HostBackend, RasterBackend};
+use softrast_raster::{HostBackend, ImageSize, RasterBackend};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers};
 
@@ -198,9 +198,10 @@ impl Task for Shape3d {
         numbers(scene.target())
     }
 
-    fn picture(&self, image: &[f64], size: usize) -> RgbImage {
-        let view = |view: usize| &image[view * size * size..(view + 1) * size * size];
-        contact_sheet(&SHOWN.map(|shown| rgb_from_gray(view(shown), size, size)), COLUMNS)
+    fn picture(&self, image: &[f64], size: ImageSize) -> RgbImage {
+        let view = |view: usize| &image[view * size.pixels()..(view + 1) * size.pixels()];
+        let picture = |shown| rgb_from_gray(view(shown), size.width, size.height);
+        contact_sheet(&SHOWN.map(picture), COLUMNS)
     }
 
     fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {

@@ -26,7 +26,7 @@ fn triangles_start_as_far_from_the_logos_as_ever() {
     for (variant, triangles, mse) in
         [(Variant::Original, 800, MSE[0]), (Variant::Transfer, 4000, MSE[1])]
     {
-        let instance = Instance::seeded(0, triangles);
+        let instance = Instance::seeded(0, triangles, 1);
         let scene = Scene::<B>::new(&Logo::of(variant).image(SIZE), &instance, SIZE);
         let hard = scene.image_loss(scene.hard(scene.vertices(scene.start())));
         let smoothness = scene.smoothness_loss(scene.start());

@@ -35,7 +35,7 @@ impl Small {
 
 impl<B: RasterBackend> Objective<B> for Small {
     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
-        let instance = Instance::seeded(1, TRIANGLES);
+        let instance = Instance::seeded(1, TRIANGLES, 1);
         let scene = Scene::<B>::new(&Logo::of(Variant::Original).image(SIZE), &instance, SIZE);
         let image = self.silhouette.coverage(scene.vertices(theta.clone()).tensor(), phi);
         scene.image_loss(image) + scene.smoothness_loss(theta)
@@ -43,7 +43,7 @@ impl<B: RasterBackend> Objective<B> for Small {
 }
 
 fn theta() -> Vec<f64> {
-    Instance::seeded(1, TRIANGLES).corners.concat()
+    Instance::seeded(1, TRIANGLES, 1).corners.concat()
 }
 
 #[test]

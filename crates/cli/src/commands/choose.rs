@@ -10,6 +10,7 @@ use softrast_lab::{
     seeds,
     select::{Budget, Candidate, Selection, chosen_flags, cost, section},
 };
+use softrast_raster::ImageSize;
 use softrast_softness::Family;
 
 use super::with_resume_hint;
@@ -120,7 +121,7 @@ fn find<T: Task>(
         let usual = make(&now)?;
         let answers = match of {
             "softness" => softnesses(&now),
-            "resolution" if T::MOVES_EDGES => resolutions(&now, usual.solve.size),
+            "resolution" if T::MOVES_EDGES => resolutions(&now, usual.image_size()),
             "tolerance" if T::MOVES_EDGES => tolerances(&now),
             "detail" => details::<T>(&now, &usual.task),
             _ => Vec::new(),
@@ -183,12 +184,12 @@ impl<A: Clone> Answer<A> {
 
 /// The resource that an answer saves.
 fn with<T: Task>(of: &str, experiment: &TaskExperiment<T>) -> String {
-    let (size, method) = (experiment.solve.size, &experiment.method);
+    let (size, method) = (experiment.image_size(), &experiment.method);
     match of {
         "softness" => counted(experiment.parameters(), "parameter"),
         "resolution" => match method.resolution {
-            Resolution::Auto => format!("at most {size} pixels a side"),
-            resolution => format!("{} pixels a side", resolution.side(size, 1.0)),
+            Resolution::Auto => format!("at most {} pixels a side", size.shorter()),
+            resolution => format!("{} pixels a side", resolution.size(size, 1.0).shorter()),
         },
         "tolerance" => format!("pixels off by {:e}", method.tolerance()),
         _ => format!("{} faces", experiment.description.faces),
@@ -221,12 +222,12 @@ fn softnesses<A: Clone>(now: &Answer<A>) -> Vec<Answer<A>> {
 }
 
 /// Resolutions of images of `size`, the fewest pixels first; none if the flags fix it. The automatic one is tried too if the scale moves.
-fn resolutions<A: Clone>(now: &Answer<A>, size: usize) -> Vec<Answer<A>> {
+fn resolutions<A: Clone>(now: &Answer<A>, size: ImageSize) -> Vec<Answer<A>> {
     if now.method.resolution.is_some() {
         return Vec::new();
     }
-    let smaller: Vec<usize> =
-        Resolution::sides(size).skip(1).take_while(|&side| side >= FEWEST).collect();
+    let sides = Resolution::sizes(size).map(ImageSize::shorter);
+    let smaller: Vec<usize> = sides.skip(1).take_while(|&side| side >= FEWEST).collect();
     let moves = now.method.schedule == Some(Schedule::Decay);
     let auto = (moves && !smaller.is_empty()).then_some(Resolution::Auto);
     let smaller = smaller.into_iter().rev().map(Resolution::Side);
@@ -270,16 +271,16 @@ mod tests {
     fn the_cheapest_comes_first_and_what_is_asked_for_is_not_asked() {
         let still = Answer { flags: String::new(), args: (), method: MethodArgs::default() };
         let sides = ["8", "16", "32", "full"].map(|name| format!("--resolution {name}"));
-        assert_eq!(flags(&resolutions(&still, 64)), sides);
+        assert_eq!(flags(&resolutions(&still, 64.into())), sides);
         let change = |change: fn(&mut MethodArgs)| {
             still.with(String::new(), |answer| change(&mut answer.method))
         };
         let moving = change(|method| method.schedule = Some(Schedule::Decay));
         let expected = ["--resolution 9", "--resolution auto", "--resolution full"];
-        assert_eq!(flags(&resolutions(&moving, 18)), expected);
-        assert_eq!(flags(&resolutions(&moving, 15)), ["--resolution full"]);
+        assert_eq!(flags(&resolutions(&moving, 18.into())), expected);
+        assert_eq!(flags(&resolutions(&moving, 15.into())), ["--resolution full"]);
         let asked = change(|method| method.resolution = Some(Resolution::Auto));
-        assert!(resolutions(&asked, 64).is_empty());
+        assert!(resolutions(&asked, 64.into()).is_empty());
         let all = tolerances(&moving);
         assert_eq!(all[3].flags, "--tolerance 1e-5");
         assert_eq!(all[0].method.tolerance, Some(Method::usual_tolerance(true)));

@@ -1,6 +1,7 @@
 use std::f64::consts::TAU;
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
+use softrast_raster::ImageSize;
 
 /// Start of the triangles of one run.
 ///
@@ -15,7 +16,7 @@ pub struct Instance {
 const COVER: f64 = 0.5;
 
 impl Instance {
-    /// An instance that depends only on `seed` and the number of triangles.
+    /// An instance that depends only on `seed`, the number of triangles and the proportions of the image.
     ///
     /// Equilateral triangles of one size are spread evenly over the image, each with a random
     /// rotation. Their areas add up to half the image. Their centres are Halton points with bases 2
@@ -23,14 +24,17 @@ impl Instance {
     ///
     /// Unlike the released code (docs/notes.md, 2D shape), whose centres fill a wider box and whose
     /// triangles are unequal and all of one shape.
-    pub fn seeded(seed: u64, triangles: usize) -> Self {
+    pub fn seeded(seed: u64, triangles: usize, size: impl Into<ImageSize>) -> Self {
+        let size = size.into();
+        let half = [size.width, size.height].map(|side| side as f64 / size.shorter() as f64);
         let mut random = StdRng::seed_from_u64(seed);
         let offset = [(); 2].map(|()| random.random::<f64>());
-        let radius = (COVER * 4.0 / triangles as f64 / (0.75 * 3f64.sqrt())).sqrt();
+        let radius =
+            (COVER * 4.0 * half[0] * half[1] / triangles as f64 / (0.75 * 3f64.sqrt())).sqrt();
         let corners = (0..triangles).flat_map(|k| {
             let centre = [0, 1].map(|axis| {
                 let base = [2, 3][axis];
-                2.0 * (radical_inverse(k + 1, base) + offset[axis]).fract() - 1.0
+                half[axis] * (2.0 * (radical_inverse(k + 1, base) + offset[axis]).fract() - 1.0)
             });
             let turn = TAU * random.random::<f64>();
             [0.0, 1.0, 2.0].map(|corner| {
@@ -59,7 +63,7 @@ mod tests {
 
     #[test]
     fn triangles_spread_evenly_and_cover_half_the_area_of_the_image() {
-        let corners = Instance::seeded(3, 800).corners;
+        let corners = Instance::seeded(3, 800, 8).corners;
         let area = |t: &[[f64; 2]]| {
             let [u, v] = [1, 2].map(|k| [t[k][0] - t[0][0], t[k][1] - t[0][1]]);
             0.5 * (u[0] * v[1] - u[1] * v[0]).abs()
@@ -78,7 +82,14 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_triangles_and_another_seed_others() {
-        assert_eq!(Instance::seeded(1, 9), Instance::seeded(1, 9));
-        assert_ne!(Instance::seeded(1, 9), Instance::seeded(2, 9));
+        assert_eq!(Instance::seeded(1, 9, 8), Instance::seeded(1, 9, 8));
+        assert_ne!(Instance::seeded(1, 9, 8), Instance::seeded(2, 9, 8));
+    }
+
+    #[test]
+    fn triangles_fill_a_wide_image() {
+        let corners = Instance::seeded(3, 800, [10, 20]).corners;
+        let beyond = |limit: f64| corners.iter().filter(|corner| corner[0].abs() > limit).count();
+        assert!((1100..1300).contains(&beyond(1.0)) && beyond(2.1) == 0, "{}", beyond(1.0));
     }
 }

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use softrast_raster::{Projected, RasterBackend, hard_silhouette};
+use softrast_raster::{ImageSize, Projected, RasterBackend, hard_silhouette};
 use softrast_tensor::{Tensor, tensor};
 
 use crate::{Targets, triangles::Instance};
@@ -24,7 +24,7 @@ const FROM_CENTROID: f64 = 1.5;
 /// use softrast_tensor::numbers;
 ///
 /// // A white picture.
-/// let scene = Scene::<HostBackend>::new(&[1.0; 64], &Instance::seeded(0, 4), 8);
+/// let scene = Scene::<HostBackend>::new(&[1.0; 64], &Instance::seeded(0, 4, 8), 8);
 /// let hard = scene.hard(scene.vertices(scene.start()));
 /// let covered = numbers(hard.clone().mean())[0];
 /// assert!((numbers(scene.image_loss(hard))[0] - (1.0 - covered)).abs() < 1e-6);
@@ -34,22 +34,23 @@ pub struct Scene<B: RasterBackend> {
     start: Tensor<B, 1>,
     targets: Targets<B>,
     faces: Arc<[[u32; 3]]>,
-    size: usize,
+    size: ImageSize,
 }
 
 impl<B: RasterBackend> Scene<B> {
-    /// The triangles of `instance` and the picture `target` `[size * size]`, top row first, in
+    /// The triangles of `instance` and the picture `target` `[height * width]`, top row first, in
     /// [0, 1].
     ///
     /// # Panics
     ///
-    /// If the picture does not have `size * size` pixels.
-    pub fn new(target: &[f64], instance: &Instance, size: usize) -> Self {
+    /// If the picture does not have this size.
+    pub fn new(target: &[f64], instance: &Instance, size: impl Into<ImageSize>) -> Self {
+        let size = size.into();
         let corners = &instance.corners;
         let faces = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
         Self {
             start: tensor(corners.concat(), [2 * corners.len()]),
-            targets: Targets::new(tensor(target.to_vec(), [1, size, size])),
+            targets: Targets::new(tensor(target.to_vec(), [1, size.height, size.width])),
             faces: faces.collect(),
             size,
         }
@@ -60,7 +61,7 @@ impl<B: RasterBackend> Scene<B> {
         self.start.clone()
     }
 
-    /// The target picture, `[1, size, size]`.
+    /// The target picture, `[1, height, width]`.
     pub fn target(&self) -> Tensor<B, 3> {
         self.targets.full()
     }
@@ -72,13 +73,13 @@ impl<B: RasterBackend> Scene<B> {
         Projected::new(Tensor::cat(vec![theta.reshape([1, count, 2]), depth], 2))
     }
 
-    /// Hard silhouette `[1, size, size]` of corners from [`Scene::vertices`].
+    /// Hard silhouette `[1, height, width]` of corners from [`Scene::vertices`].
     pub fn hard(&self, vertices: Projected<B>) -> Tensor<B, 3> {
         hard_silhouette(vertices, &self.faces, self.size)
     }
 
-    /// Mean squared difference of `image` `[1, side, side]` and the picture, `[1]`; the side is the
-    /// size of the scene, possibly halved some times.
+    /// Mean squared difference of `image` `[1, height, width]` and the picture, `[1]`; the size is
+    /// that of the scene, possibly halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
         self.targets.mse_loss(image)
     }

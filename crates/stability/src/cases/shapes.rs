@@ -122,7 +122,7 @@ fn dying(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     levels([1e-4, 1e-3, 1e-2, 1e-1], |scale: f64| {
         let softness = tested.at(scale);
         let config = SolveConfig { size: SIDE, steps: 60, learning_rate: 0.02 };
-        let found = descend(&problem, &[Instance::seeded(0, 80)], softness.clone(), config)?;
+        let found = descend(&problem, &[Instance::seeded(0, 80, 1)], softness.clone(), config)?;
         let corners = found.last().chunks(2).map(|p| [p[0], p[1], 1.0]).collect();
         let flat = PlanarScene::loose(corners);
         let drawn = RenderRequest::new(&softness, &flat, SIDE).fused::<Single>();

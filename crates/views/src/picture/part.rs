@@ -1,6 +1,7 @@
 //! Resampling of parts of a picture, by means over areas.
 
 use anyhow::{Context, ensure};
+use softrast_raster::ImageSize;
 use softrast_tensor::{Backend, Tensor, tensor_on};
 
 use super::Picture;
@@ -67,6 +68,23 @@ impl Picture {
         let (left, top) = ((width - longest) / 2.0, (height - longest) / 2.0);
         let [levels, _] = self.part([left, top, longest], size);
         levels
+    }
+
+    /// The size of this picture where its shorter side has `size` pixels; the longer one is rounded.
+    pub fn size_at(&self, size: usize) -> ImageSize {
+        let own = self.size();
+        let side =
+            |long: usize| (long as f64 * size as f64 / own.shorter() as f64).round() as usize;
+        [side(own.height), side(own.width)].into()
+    }
+
+    /// The whole picture at this size, `[height * width]`: its means over the pixels.
+    pub fn resized(&self, size: ImageSize) -> Vec<f64> {
+        let own = self.size();
+        let shares =
+            |count: usize, cells: usize| shares(count, 0.0, count as f64 / cells as f64, cells);
+        let (columns, rows) = (shares(own.width, size.width), shares(own.height, size.height));
+        means(&columns, &rows, own.width, &self.levels)
     }
 
     /// [`Picture::levels`] as a tensor `[1, size, size]`.
@@ -152,6 +170,16 @@ mod tests {
         let middle = 0.5;
         let expected = [0.0, middle, 1.0, middle, middle, middle, 1.0, middle, 0.0];
         assert_close(&picture.levels(3), &expected);
+    }
+
+    #[test]
+    fn a_resized_picture_keeps_its_proportions_and_has_the_means_of_its_pixels() {
+        let picture = Picture::new(vec![0.0, 1.0, 1.0, 0.0, 0.5, 0.5, 0.0, 0.0], 4);
+        let size = picture.size_at(1);
+        assert_eq!([size.height, size.width], [1, 2]);
+        assert_close(&picture.resized(size), &[0.5, 0.25]);
+        assert_close(&picture.resized(picture.size_at(2)), &picture.levels(4)[4..12]);
+        assert_eq!(Picture::new(vec![0.0; 6], 3).size_at(5), [5, 8].into());
     }
 
     #[test]

@@ -7,7 +7,7 @@ use softrast_cli::{
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, pose::PoseInstance};
 use softrast_lab::rgb_from_planes;
-use softrast_raster::{HostBackend, RasterBackend};
+use softrast_raster::{HostBackend, ImageSize, RasterBackend};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers};
 
@@ -137,29 +137,25 @@ impl Task for Coloured {
         numbers(scene.target())
     }
 
-    fn picture(&self, image: &[f64], size: usize) -> RgbImage {
-        rgb_from_planes(colours(image, size), size, size)
+    fn picture(&self, image: &[f64], size: ImageSize) -> RgbImage {
+        let (colours, _) = split(image);
+        rgb_from_planes(colours, size.width, size.height)
     }
 
-    fn frame(&self, image: &[f64], target: &[f64], size: usize) -> RgbImage {
-        outlined(self.picture(image, size), silhouette(target, size))
+    fn frame(&self, image: &[f64], target: &[f64], size: ImageSize) -> RgbImage {
+        let (_, silhouette) = split(target);
+        outlined(self.picture(image, size), silhouette)
     }
 
     fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {
         let Ended { seed, instance, target, size, theta, .. } = *run;
         // The loss includes colours, so it cannot show that the mesh is outside the target; 0 disables that warning.
-        let run =
-            Ended { seed, instance, target: silhouette(target, size), size, hard: 0.0, theta };
-        self.pose.warnings(&run)
+        let (_, target) = split(target);
+        self.pose.warnings(&Ended { seed, instance, target, size, hard: 0.0, theta })
     }
 }
 
-/// Red, green and blue of an image of one instance.
-fn colours(image: &[f64], size: usize) -> &[f64] {
-    &image[..3 * size * size]
-}
-
-/// The coverage of an image of one instance.
-fn silhouette(image: &[f64], size: usize) -> &[f64] {
-    &image[3 * size * size..]
+/// Red, green and blue of an image of one instance, and its coverage.
+fn split(image: &[f64]) -> (&[f64], &[f64]) {
+    image.split_at(image.len() / 4 * 3)
 }

@@ -2,7 +2,8 @@ use std::sync::Arc;
 
 use softrast_inverse::{SoftnessAt, Targets};
 use softrast_raster::{
-    Attributes, Background, ColourRenderer, Projected, RasterBackend, Weighting, nearest_faces,
+    Attributes, Background, ColourRenderer, ImageSize, Projected, RasterBackend, Weighting,
+    nearest_faces,
 };
 use softrast_softness::{DepthSoftness, Family, Softness};
 use softrast_tensor::{Tensor, numbers, tensor};
@@ -34,7 +35,7 @@ pub struct Scene<B: RasterBackend> {
     targets: Targets<B>,
     background: [f64; 3],
     faces: Arc<[[u32; 3]]>,
-    size: usize,
+    size: ImageSize,
 }
 
 impl<B: RasterBackend> Scene<B> {
@@ -54,7 +55,7 @@ impl<B: RasterBackend> Scene<B> {
         let size = picture.size();
         Self {
             start: tensor(theta, [ENTRIES * count]),
-            targets: Targets::new(tensor(picture.planes(), [3, size, size])),
+            targets: Targets::new(tensor(picture.planes(), [3, size.height, size.width])),
             background: picture.mean(),
             faces: (0..count as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
             size,
@@ -66,7 +67,7 @@ impl<B: RasterBackend> Scene<B> {
         self.start.clone()
     }
 
-    /// The picture, `[3, size, size]`.
+    /// The picture, `[3, height, width]`.
     pub fn target(&self) -> Tensor<B, 3> {
         self.targets.full()
     }
@@ -77,7 +78,7 @@ impl<B: RasterBackend> Scene<B> {
         Tensor::cat(vec![corners, colours.clamp(0.0, 1.0), nearness.clamp(0.0, 1.0)], 0)
     }
 
-    /// The soft image at θ under the softness of a step, `[1, 3, side, side]`.
+    /// The soft image at θ under the softness of a step, `[1, 3, height, width]`.
     ///
     /// The weight of a triangle among overlapping ones is its edge softness times its depth
     /// softness: its depth also acts as its opacity, and there is no separate one.
@@ -136,7 +137,7 @@ impl<B: RasterBackend> Scene<B> {
         (self.vertices(corners, nearness), colours, background)
     }
 
-    /// The hard image at θ, `[1, 3, size, size]`: at each pixel the colour of the nearest triangle. It has no gradient.
+    /// The hard image at θ, `[1, 3, height, width]`: at each pixel the colour of the nearest triangle. It has no gradient.
     pub fn hard(&self, theta: Tensor<B, 1>) -> Tensor<B, 4> {
         let [corners, colours, nearness] = self.parts(theta);
         let vertices = self.vertices(corners, nearness);
@@ -146,11 +147,11 @@ impl<B: RasterBackend> Scene<B> {
             face.map_or(self.background[k], |face| colours[3 * face as usize + k])
         };
         let planes = (0..3).flat_map(|k| nearest.iter().map(move |&face| level(k, face)));
-        tensor(planes.collect(), [1, 3, size, size])
+        tensor(planes.collect(), [1, 3, size.height, size.width])
     }
 
-    /// Mean squared difference of `image` `[1, 3, side, side]` and the picture, `[1]`; the side is
-    /// the size of the scene, possibly halved some times.
+    /// Mean squared difference of `image` `[1, 3, height, width]` and the picture, `[1]`; the size is
+    /// that of the scene, possibly halved some times.
     pub fn image_loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
         self.targets.mse_loss(image.squeeze_dim(0)).mean()
     }
@@ -166,7 +167,7 @@ impl<B: RasterBackend> Scene<B> {
         }
         let renderer = softness.colour_renderer(&self.faces, PLANES, DEPTH, DEPTH_SCALE);
         let (vertices, colours, background) = self.inputs(theta, &renderer);
-        let (target, _) = self.targets.at(softness.side());
+        let (target, _) = self.targets.at(softness.size());
         renderer.mse_loss(vertices, &colours, &background, target.unsqueeze())
     }
 
@@ -179,18 +180,19 @@ impl<B: RasterBackend> Scene<B> {
             let byte = |level: &f64| (level.clamp(0.0, 1.0) * 255.0).round() as u8;
             colour.iter().map(|level| format!("{:02x}", byte(level))).collect::<String>()
         };
+        let ImageSize { height, width } = size;
         let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {size} {size}\" shape-rendering=\"crispEdges\">\n<rect width=\"{size}\" \
-             height=\"{size}\" fill=\"#{}\"/>\n",
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" shape-rendering=\"crispEdges\">\n<rect width=\"{width}\" \
+             height=\"{height}\" fill=\"#{}\"/>\n",
             hex(&self.background)
         );
         let mut order: Vec<usize> = (0..count).rev().collect();
         order.sort_by(|&a, &b| nearness[a].total_cmp(&nearness[b]));
-        let half = 0.5 * size as f64;
+        let [right, down, unit] = [width, height, size.shorter()].map(|side| 0.5 * side as f64);
         for k in order {
             let points = corners[6 * k..6 * k + 6].chunks(2);
             let points =
-                points.map(|p| format!("{:.2},{:.2}", half * (1.0 + p[0]), half * (1.0 - p[1])));
+                points.map(|p| format!("{:.2},{:.2}", right + unit * p[0], down - unit * p[1]));
             let points = points.collect::<Vec<_>>().join(" ");
             let fill = hex(&colours[3 * k..3 * k + 3]);
             svg += &format!("<polygon points=\"{points}\" fill=\"#{fill}\"/>\n");

@@ -39,7 +39,9 @@ impl Start {
     /// of cuts and the nearness of triangles depend on `seed`.
     pub fn seeded(seed: u64, triangles: usize, picture: &Colours) -> Self {
         let mut random = StdRng::seed_from_u64(seed);
-        let mut diagonals = [[[-1.0, -1.0], [1.0, 1.0]], [[1.0, -1.0], [-1.0, 1.0]]];
+        let size = picture.size();
+        let [x, y] = [size.width, size.height].map(|side| side as f64 / size.shorter() as f64);
+        let mut diagonals = [[[-x, -y], [x, y]], [[x, -y], [-x, y]]];
         if random.random() {
             diagonals.swap(0, 1);
         }
@@ -75,8 +77,9 @@ impl Piece {
             squares += colour.iter().map(|level| level * level).sum::<f64>();
         });
         let [u, v] = [1, 2].map(|k| [0, 1].map(|axis| corners[k][axis] - corners[0][axis]));
-        let pixels = (picture.size() * picture.size()) as f64;
-        let area = 0.125 * pixels * (u[0] * v[1] - u[1] * v[0]).abs();
+        // Half a pixel is one over the shorter side.
+        let pixels = 0.25 * (picture.size().shorter() as f64).powi(2);
+        let area = 0.5 * pixels * (u[0] * v[1] - u[1] * v[0]).abs();
         if count == 0.0 {
             // Smaller than a pixel.
             let centroid = [0, 1].map(|axis| corners.iter().map(|c| c[axis]).sum::<f64>() / 3.0);

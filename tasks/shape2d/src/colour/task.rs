@@ -8,7 +8,7 @@ use softrast_cli::{
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::rgb_from_planes;
-use softrast_raster::{HostBackend, RasterBackend};
+use softrast_raster::{HostBackend, ImageSize, RasterBackend};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers};
 use softrast_views::Picture;
@@ -22,7 +22,7 @@ use crate::{
 const SUCCESS_DB: f64 = 24.0;
 /// Lower limit of the mean squared error in a PSNR, so that it is finite: at most 100 dB.
 const LEAST_MSE: f64 = 1e-10;
-/// Pixels a side of the picture for the start of triangles, independent of the size of the image.
+/// Shorter side of the picture for the start of triangles, in pixels, independent of the size of the image.
 const START_SIZE: usize = 256;
 
 /// 2D SHAPE in colour: loose triangles with colours and depths, and their target picture.
@@ -43,11 +43,12 @@ impl Coloured {
             let pixels = match &self.picture {
                 None => landscape(size),
                 Some(picture) => {
-                    let [red, green, blue] = picture.each_ref().map(|plane| plane.levels(size));
-                    (0..size * size).map(|k| [red[k], green[k], blue[k]]).collect()
+                    let full = self.image_size(size);
+                    let [red, green, blue] = picture.each_ref().map(|plane| plane.resized(full));
+                    (0..full.pixels()).map(|k| [red[k], green[k], blue[k]]).collect()
                 }
             };
-            Rc::new(Colours::new(pixels, size))
+            Rc::new(Colours::new(pixels, self.image_size(size)))
         };
         self.sizes.borrow_mut().entry(size).or_insert_with(made).clone()
     }
@@ -59,6 +60,10 @@ impl InverseProblem for Coloured {
 
     fn instance(&self, seed: u64) -> anyhow::Result<Start> {
         Ok(Start::seeded(seed, self.triangles, &self.target(START_SIZE)))
+    }
+
+    fn image_size(&self, size: usize) -> ImageSize {
+        self.picture.as_ref().map_or(size.into(), |[red, ..]| red.size_at(size))
     }
 
     /// The scene of the single instance.
@@ -175,8 +180,8 @@ impl Task for Coloured {
         numbers(scene.target())
     }
 
-    fn picture(&self, image: &[f64], size: usize) -> RgbImage {
-        rgb_from_planes(image, size, size)
+    fn picture(&self, image: &[f64], size: ImageSize) -> RgbImage {
+        rgb_from_planes(image, size.width, size.height)
     }
 
     fn drawing(&self, scene: &Scene<HostBackend>, theta: &[f64]) -> Option<String> {
@@ -184,9 +189,9 @@ impl Task for Coloured {
     }
 
     fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {
-        let Ended { seed, size, target, hard, .. } = *run;
+        let Ended { seed, target, hard, .. } = *run;
         // The error of the mean colour alone.
-        let variance = target.chunks(size * size).map(|plane| {
+        let variance = target.chunks(target.len() / 3).map(|plane| {
             let mean = plane.iter().sum::<f64>() / plane.len() as f64;
             plane.iter().map(|level| (level - mean).powi(2)).sum::<f64>() / plane.len() as f64
         });
