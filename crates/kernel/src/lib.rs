@@ -58,7 +58,8 @@
 //!
 //! # Implementation
 //!
-//! One traversal serves every pass. A view is cut into bands of rows; each band lists the faces
+//! One traversal serves every pass of silhouettes, another every pass of colours, over the same
+//! bands and lists. A view is cut into bands of rows; each band lists the faces
 //! whose support reaches it and walks their pixels in blocks of a row. Bands are independent, so
 //! they run in parallel, and every sum is taken in an order that does not depend on the number of
 //! threads. The arithmetic of a pixel-face pair is written once, generic over `Real`: floats give

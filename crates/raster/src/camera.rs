@@ -77,11 +77,6 @@ impl Orbit {
     }
 }
 
-/// Points in world units as a tensor `[1, points, 3]`, in the float type of the backend: mesh vertices, for [`project`](crate::project).
-pub fn vertex_tensor<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tensor<B, 3> {
-    tensor_on(positions.concat(), [1, positions.len(), 3], device)
-}
-
 pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| a[k] * b[k]).sum()
 }
