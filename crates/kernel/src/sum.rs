@@ -96,16 +96,25 @@ pub(crate) fn vjp_of_vjp<F: Vectors>(
     along: [bool; 2],
     wanted: [bool; 3],
 ) -> Vec<F> {
-    let nothing = |length: usize| vec![F::ZERO; length];
-    let (count, rows) = (inputs.vertices.len(), inputs.table.len());
-    let still =
-        [nothing(if along[0] { 0 } else { count }), nothing(if along[1] { 0 } else { rows })];
-    let (to_vertices, to_table) = direction.split_at(if along[0] { count } else { 0 });
-    let tangents = [
-        if along[0] { to_vertices } else { &still[0] },
-        if along[1] { to_table } else { &still[1] },
-    ];
+    let tangents = tangents([inputs.vertices, inputs.table], along, direction);
+    let tangents = tangents.each_ref().map(|own| &own[..]);
     on_vectors!(gradient::<Dual<F>>(&inputs.scene(tangents), bands, upstream, wanted))
+}
+
+/// Tangents of inputs: consecutive parts of `direction` for those that it is `along`, zeros for the others.
+pub(crate) fn tangents<'a, F: Vectors, const N: usize>(
+    inputs: [&[F]; N],
+    along: [bool; N],
+    mut direction: &'a [F],
+) -> [Cow<'a, [F]>; N] {
+    std::array::from_fn(|k| {
+        if !along[k] {
+            return Cow::Owned(vec![F::ZERO; inputs[k].len()]);
+        }
+        let (own, rest) = direction.split_at(inputs[k].len());
+        direction = rest;
+        Cow::Borrowed(own)
+    })
 }
 
 /// Runs the image part of a walk over all bands; `[views, height, width]`.

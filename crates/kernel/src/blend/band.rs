@@ -30,6 +30,7 @@ pub(super) struct BandSums<F> {
 }
 
 /// Results of a band.
+#[derive(Default)]
 pub(super) struct Walked<F> {
     /// The loss of its pixels, if they were judged.
     pub(super) loss: F,
@@ -70,7 +71,8 @@ impl<T: Real> Work for Drawn<'_, '_, T> {
                 &own
             }
         };
-        let mut walked = of.nothing(upstream.map(|(_, wanted)| wanted));
+        let texels = of.blend.no_texels(upstream.map(|(_, wanted)| wanted));
+        let mut walked = Walked { texels, ..Walked::default() };
         if upstream.is_none() || T::DUAL {
             walked.image = of.image(sums);
         }
@@ -90,18 +92,6 @@ impl<'a, 's, T: Real> Band<'a, 's, T> {
     /// Length of the buffers of its pixels.
     fn length(&self) -> usize {
         self.place().length(&self.blend.scene)
-    }
-
-    /// Results before anything is drawn.
-    pub(super) fn nothing(&self, wanted: Option<[bool; 5]>) -> Walked<Float<T>> {
-        Walked {
-            loss: <Float<T> as float::Float>::ZERO,
-            image: Vec::new(),
-            faces: Vec::new(),
-            tables: [Vec::new(), Vec::new()],
-            background: Vec::new(),
-            texels: self.blend.no_texels(wanted.is_some_and(|wanted| wanted[4])),
-        }
     }
 
     /// Walks over the pairs of the faces from list `first_list` on.

@@ -72,7 +72,8 @@ impl<L: Lanes> Work for JudgedBand<'_, '_, L> {
                 of.walk_from(records.count, sums);
             }
         });
-        let mut walked = of.nothing(Some(wanted));
+        let texels = of.blend.no_texels(Some(wanted));
+        let mut walked = Walked { texels, ..Walked::default() };
         let image = of.image(&sums);
         let mut upstream: Vec<_> =
             image.iter().map(|plane| vec![L::Float::ZERO; plane.len()]).collect();

@@ -85,6 +85,7 @@ use super::{
     float::{self, Vectors, on_vectors},
     lanes::{Lanes, run},
     real::{Dual, Float, Real},
+    sum::tangents,
     tasks::task,
 };
 
@@ -147,17 +148,8 @@ pub(crate) fn vjp_of_vjp<F: Vectors>(
 ) -> Vec<F> {
     let of_inputs =
         [inputs.vertices, inputs.attributes, inputs.tables, inputs.background, inputs.texture];
-    let still: [Vec<F>; 5] =
-        std::array::from_fn(|k| vec![F::ZERO; if along[k] { 0 } else { of_inputs[k].len() }]);
-    let mut direction = direction;
-    let tangents = std::array::from_fn(|k| {
-        if !along[k] {
-            return &still[k][..];
-        }
-        let (own, rest) = direction.split_at(of_inputs[k].len());
-        direction = rest;
-        own
-    });
+    let tangents = tangents(of_inputs, along, direction);
+    let tangents = tangents.each_ref().map(|own| &own[..]);
     let [wanted @ .., to_upstream] = wanted;
     let pull = Some((upstream, wanted));
     let passed = on_vectors!(drawn::<Dual<F>>(inputs, tangents, kept, pull));
@@ -168,6 +160,7 @@ pub(crate) fn vjp_of_vjp<F: Vectors>(
 }
 
 /// Results of a band, of the bands of a view, or of all views. Results of dual numbers are tangents.
+#[derive(Default)]
 struct Passed<F> {
     /// View by view; 0 where nothing is judged.
     losses: Vec<F>,
@@ -262,13 +255,9 @@ fn passes<T: Real>(
         })
         .collect();
     let mut passed = Passed {
-        losses: Vec::new(),
-        images: Vec::new(),
-        vertices: Vec::new(),
         attributes: vec![zero; if wanted.is_some() { inputs.attributes.len() } else { 0 }],
-        tables: Vec::new(),
-        background: Vec::new(),
-        texels: blend.no_texels(wanted.is_some_and(|wanted| wanted[4])),
+        texels: blend.no_texels(wanted),
+        ..Passed::default()
     };
     for (index, mut view) in per_view.into_iter().enumerate() {
         passed.losses.append(&mut view.losses);
@@ -313,11 +302,8 @@ fn gather<T: Real>(
     let mut passed = Passed {
         losses: vec![walked.iter().fold(zero, |loss, band| loss + band.loss)],
         images: vec![image],
-        vertices: Vec::new(),
-        attributes: Vec::new(),
-        tables: Vec::new(),
-        background: Vec::new(),
-        texels: blend.no_texels(wanted.is_some_and(|wanted| wanted[4])),
+        texels: blend.no_texels(wanted),
+        ..Passed::default()
     };
     let Some([_, of_attributes, ..]) = wanted else { return passed };
     let count = inputs.vertices.len() / inputs.views / 3;

@@ -162,8 +162,9 @@ pub(super) struct Blend<'a, T: Real> {
 }
 
 impl<T: Real> Blend<'_, T> {
-    /// A gradient of the texels of the texture, if it is wanted, else of none.
-    pub(super) fn no_texels(&self, wanted: bool) -> TexelSums<Float<T>> {
+    /// A gradient of the texels of the texture, if it is among the `wanted` ones, else of none.
+    pub(super) fn no_texels(&self, wanted: Option<[bool; 5]>) -> TexelSums<Float<T>> {
+        let wanted = wanted.is_some_and(|wanted| wanted[4]);
         let texels = self.texture.as_ref().filter(|_| wanted).map(|texture| texture.size);
         TexelSums::new(texels.map_or(0, |[height, width]| height * width))
     }

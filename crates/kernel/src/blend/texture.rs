@@ -135,6 +135,7 @@ impl<T: Real> Sample<T> {
 }
 
 /// A gradient of texels, allocated sparsely.
+#[derive(Default)]
 pub(super) struct TexelSums<F> {
     runs: Vec<Option<Box<[[F; TEXEL_CHANNELS]; RUN]>>>,
     texels: usize,
