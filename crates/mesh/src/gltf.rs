@@ -11,7 +11,8 @@ use serde_json::Value;
 use crate::{
     error::Trouble,
     gltf_buffers::{Content, Files, data},
-    gltf_component::Component,
+    gltf_component::{can_index, checked_component, component, value_of},
+    number::Number,
 };
 
 /// The supported part of the JSON; everything else is skipped.
@@ -208,10 +209,10 @@ impl<'a> Gltf<'a> {
     /// The entries of an accessor of linear colours, without alpha; the value that stands for 1; and whether the accessor declares it.
     pub(crate) fn colours(&self, accessor: usize) -> Result<(Vec<[f64; 3]>, f64, bool), Trouble> {
         self.of_accessor(accessor, |it| {
-            let (full, said) = match Component::of(it.component_type) {
-                Some(Component::U8) => (f64::from(u8::MAX), it.normalized),
-                Some(Component::U16) => (f64::from(u16::MAX), it.normalized),
-                Some(Component::F32) => (1.0, true),
+            let (full, said) = match component(it.component_type) {
+                Some(Number::U8) => (f64::from(u8::MAX), it.normalized),
+                Some(Number::U16) => (f64::from(u16::MAX), it.normalized),
+                Some(Number::F32) => (1.0, true),
                 _ => return Err("colours are floats, or bytes or shorts without a sign".to_owned()),
             };
             let values = match it.shape.as_str() {
@@ -272,7 +273,7 @@ impl<'a> Gltf<'a> {
 
     /// Location of the entries of an accessor; `None` if they are zero, except sparse ones.
     fn source(&self, accessor: &Accessor) -> Result<Option<Source>, String> {
-        let (component, count) = (Component::checked(accessor.component_type)?, accessor.count);
+        let (component, count) = (checked_component(accessor.component_type)?, accessor.count);
         match accessor.buffer_view {
             Some(view) => Ok(Some(Source { view, offset: accessor.byte_offset, component })),
             // Such entries take no bytes, so their number must be bounded.
@@ -293,7 +294,7 @@ impl<'a> Gltf<'a> {
     }
 
     fn are_indices(accessor: &Accessor) -> Result<(), String> {
-        let whole = Component::of(accessor.component_type).is_some_and(Component::can_index);
+        let whole = component(accessor.component_type).is_some_and(can_index);
         if accessor.shape == "SCALAR" && whole && !accessor.normalized {
             return Ok(());
         }
@@ -306,11 +307,11 @@ impl<'a> Gltf<'a> {
         normalized: bool,
     ) -> Result<Vec<[f64; N]>, String> {
         let count = accessor.count;
-        let component = Component::checked(accessor.component_type)?;
-        if normalized && matches!(component, Component::F32 | Component::U32) {
+        let component = checked_component(accessor.component_type)?;
+        if normalized && matches!(component, Number::F32 | Number::U32) {
             return Err("floats and 32-bit integers cannot be normalized".to_owned());
         }
-        let read = |bytes: [&[u8]; N]| bytes.map(|b| component.value(b, normalized));
+        let read = |bytes: [&[u8]; N]| bytes.map(|b| value_of(component, b, normalized));
         let mut values = match self.source(accessor)? {
             Some(source) => source.entries(self, count)?.map(read).collect(),
             None => vec![[0.0; N]; count],
@@ -320,8 +321,8 @@ impl<'a> Gltf<'a> {
                 return Err(format!("{changed} sparse entries of {count}"));
             }
             let code = indices.component_type.unwrap_or_default();
-            let whole = Component::checked(code)?;
-            if !whole.can_index() {
+            let whole = checked_component(code)?;
+            if !can_index(whole) {
                 return Err(format!("component type {code} cannot be an index"));
             }
             let part = |part: &Part, component| Source {
@@ -332,7 +333,7 @@ impl<'a> Gltf<'a> {
             let (places, entries) = (part(indices, whole), part(new, component));
             let places = places.entries::<1>(self, *changed)?;
             for ([place], entry) in places.zip(entries.entries(self, *changed)?) {
-                let place = whole.value(place, false) as usize;
+                let place = value_of(whole, place, false) as usize;
                 let value = values.get_mut(place);
                 *value.ok_or(format!("sparse index {place} is out of range: {count} entries"))? =
                     read(entry);
@@ -346,7 +347,7 @@ impl<'a> Gltf<'a> {
 struct Source {
     view: usize,
     offset: usize,
-    component: Component,
+    component: Number,
 }
 
 impl Source {

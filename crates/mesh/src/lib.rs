@@ -34,6 +34,7 @@ mod icosphere;
 mod material;
 mod mesh;
 mod normalized;
+mod number;
 mod obj;
 mod obj_texture;
 mod off;

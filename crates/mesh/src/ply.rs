@@ -10,8 +10,9 @@ use crate::{
     colours::{Beyond, Colours},
     error::{Place, Trouble, shown},
     mesh::finite,
+    number::Number,
     parts::Parts,
-    ply_header::{Element, Encoding, Header, Number, Property},
+    ply_header::{Element, Encoding, Header, Property},
     polygon::Polygons,
     statements::next_line,
 };
@@ -257,22 +258,14 @@ impl<'a> Body<'a> {
 
     /// The value of `bytes`, whose number is that of the type.
     fn number(&self, bytes: &[u8], number: Number) -> f64 {
+        if self.encoding == Encoding::LittleEndian {
+            return number.of_le(bytes);
+        }
         let mut low = [0; 8];
-        low[..bytes.len()].copy_from_slice(bytes);
-        if self.encoding == Encoding::BigEndian {
-            low[..bytes.len()].reverse();
-        }
-        let [a, b, c, d, ..] = low;
-        match number {
-            Number::I8 => i8::from_le_bytes([a]).into(),
-            Number::U8 => a.into(),
-            Number::I16 => i16::from_le_bytes([a, b]).into(),
-            Number::U16 => u16::from_le_bytes([a, b]).into(),
-            Number::I32 => i32::from_le_bytes([a, b, c, d]).into(),
-            Number::U32 => u32::from_le_bytes([a, b, c, d]).into(),
-            Number::F32 => f32::from_le_bytes([a, b, c, d]).into(),
-            Number::F64 => f64::from_le_bytes(low),
-        }
+        let low = &mut low[..bytes.len()];
+        low.copy_from_slice(bytes);
+        low.reverse();
+        number.of_le(low)
     }
 }
 

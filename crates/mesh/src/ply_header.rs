@@ -3,6 +3,7 @@
 use crate::{
     Fault,
     error::{Trouble, shown},
+    number::Number,
     statements::next_line,
 };
 
@@ -40,46 +41,19 @@ pub(crate) struct Property {
     pub(crate) number: Number,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Number {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
-}
-
-impl Number {
-    fn of(name: &str) -> Result<Self, Fault> {
-        Ok(match name {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
-            _ => return Err(Fault::format(format!("{:?} is not a type of PLY", shown(name)))),
-        })
-    }
-
-    pub(crate) fn is_whole(self) -> bool {
-        !matches!(self, Self::F32 | Self::F64)
-    }
-
-    /// Size in a binary file, in bytes.
-    pub(crate) fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
+/// The type called `name`.
+fn number_type(name: &str) -> Result<Number, Fault> {
+    Ok(match name {
+        "char" | "int8" => Number::I8,
+        "uchar" | "uint8" => Number::U8,
+        "short" | "int16" => Number::I16,
+        "ushort" | "uint16" => Number::U16,
+        "int" | "int32" => Number::I32,
+        "uint" | "uint32" => Number::U32,
+        "float" | "float32" => Number::F32,
+        "double" | "float64" => Number::F64,
+        _ => return Err(Fault::format(format!("{:?} is not a type of PLY", shown(name)))),
+    })
 }
 
 impl Header {
@@ -124,14 +98,14 @@ fn statement(
             elements.push(Element { name: shown(name), count, properties: Vec::new(), line });
         }
         ["property", "list", count, number, name, ..] => {
-            let list = Number::of(count)?;
+            let list = number_type(count)?;
             if !list.is_whole() {
                 return Err(Fault::format("the length of a list must be of a whole type"));
             }
-            add(elements, name, Some(list), Number::of(number)?)?;
+            add(elements, name, Some(list), number_type(number)?)?;
         }
         ["property", number, name, ..] if number != "list" => {
-            add(elements, name, None, Number::of(number)?)?
+            add(elements, name, None, number_type(number)?)?
         }
         ["format" | "element" | "property", ..] => {
             let text = shown(&words.join(" "));
