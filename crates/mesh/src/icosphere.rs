@@ -1,9 +1,8 @@
 //! A sphere of nearly equal triangles.
 
-use std::collections::HashMap;
-
 use crate::{
     Mesh,
+    subdivision::quartered,
     vectors::{cross, dot, norm},
 };
 
@@ -19,20 +18,11 @@ pub fn icosphere(subdivisions: u32) -> Mesh {
     assert!(subdivisions <= 10, "an icosphere of {subdivisions} subdivisions is too large");
     let (mut positions, mut faces) = icosahedron();
     for _ in 0..subdivisions {
-        // Two faces share an edge, so the vertex in its middle is created once.
-        let mut middles = HashMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                let (p, q) = (positions[a as usize], positions[b as usize]);
-                positions.push(on_sphere([0, 1, 2].map(|k| p[k] + q[k])));
-                positions.len() as u32 - 1
-            })
-        };
-        let quarters = |[a, b, c]: [u32; 3]| {
-            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-        };
-        faces = faces.into_iter().flat_map(quarters).collect();
+        faces = quartered(&faces, |ends| {
+            let [p, q] = ends.map(|end| positions[end as usize]);
+            positions.push(on_sphere([0, 1, 2].map(|k| p[k] + q[k])));
+            positions.len() as u32 - 1
+        });
     }
     Mesh::from_valid(positions, faces)
 }
