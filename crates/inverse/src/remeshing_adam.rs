@@ -1,5 +1,5 @@
 use rayon::prelude::*;
-use softrast_mesh::{ClosedSurface, Mesh, MeshError, SurfaceGeometry};
+use softrast_mesh::{ClosedSurface, Mesh, MeshError, SurfaceGeometry, vectors::dot};
 use softrast_raster::RasterBackend;
 use softrast_tensor::{Backend, Element, Tensor, TensorData};
 
@@ -318,11 +318,6 @@ impl RemeshingAdam {
 #[inline(always)]
 fn at(numbers: &[f32], vertex: usize) -> [f32; 3] {
     [numbers[3 * vertex], numbers[3 * vertex + 1], numbers[3 * vertex + 2]]
-}
-
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

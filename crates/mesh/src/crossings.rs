@@ -2,7 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::Mesh;
+use crate::{
+    Mesh,
+    vectors::{cross, difference, dot},
+};
 
 /// Cells of the search are this many times as wide as the mean extent of a face.
 const CELL: f64 = 2.0;
@@ -117,10 +120,8 @@ fn pierces([from, to]: [[f64; 3]; 2], &[a, b, c]: &[[f64; 3]; 3]) -> bool {
 
 /// Six times the signed volume of a tetrahedron.
 fn volume([a, b, c]: [[f64; 3]; 3], d: [f64; 3]) -> f64 {
-    let [u, v, w] = [a, b, c].map(|p| [0, 1, 2].map(|k| p[k] - d[k]));
-    u[0] * (v[1] * w[2] - v[2] * w[1])
-        + u[1] * (v[2] * w[0] - v[0] * w[2])
-        + u[2] * (v[0] * w[1] - v[1] * w[0])
+    let [u, v, w] = [a, b, c].map(|p| difference(p, d));
+    dot(u, cross(v, w))
 }
 
 #[cfg(test)]

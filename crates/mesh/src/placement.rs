@@ -2,7 +2,7 @@
 
 use crate::{
     gltf::Node,
-    vectors::{cross, dot},
+    vectors::{cross, dot, rotation},
 };
 
 /// `p ↦ linear p + offset`.
@@ -30,13 +30,8 @@ impl Placement {
         }
         let [x, y, z, w] = node.rotation.as_deref().copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
         let scale = node.scale.as_deref().copied().unwrap_or([1.0; 3]);
-        let turned = [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-        ];
         Self {
-            linear: turned.map(|row| each.map(|j| row[j] * scale[j])),
+            linear: rotation([w, x, y, z]).map(|row| each.map(|j| row[j] * scale[j])),
             offset: node.translation.as_deref().copied().unwrap_or_default(),
         }
     }

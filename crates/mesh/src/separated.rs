@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::Mesh;
+use crate::{
+    Mesh,
+    vectors::{cross, difference, norm},
+};
 
 /// Most rounds of moves.
 const ROUNDS: usize = 10;
@@ -125,13 +128,11 @@ fn moved(mesh: &Mesh, neighbours: &[Vec<u32>], how: impl Fn(usize) -> Option<Mov
         for v in
             face.iter().map(|&v| v as usize).filter(|&v| matches!(how(v), Some(Move::Along(_))))
         {
-            let [p, q] = [b, c].map(|x| [0, 1, 2].map(|k| x[k] - a[k]));
-            let n = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| p[i] * q[j] - p[j] * q[i]);
+            let n = cross(difference(b, a), difference(c, a));
             let sum = normals.entry(v).or_default();
             (0..3).for_each(|k| sum[k] += n[k]);
         }
     }
-    let length = |x: [f64; 3]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     let place = |v: usize| {
         let (here, around) = (before[v], &neighbours[v]);
         let count = around.len() as f64;
@@ -141,10 +142,10 @@ fn moved(mesh: &Mesh, neighbours: &[Vec<u32>], how: impl Fn(usize) -> Option<Mov
             Some(Move::Mean) => [0, 1, 2]
                 .map(|k| around.iter().map(|&n| before[n as usize][k]).sum::<f64>() / count),
             Some(Move::Along(step)) => {
-                let edge = |&n: &u32| length([0, 1, 2].map(|k| before[n as usize][k] - here[k]));
+                let edge = |&n: &u32| norm(difference(before[n as usize], here));
                 let normal = normals.get(&v).copied().unwrap_or_default();
                 let by = step * around.iter().map(edge).sum::<f64>() / count;
-                let by = by / length(normal).max(f64::MIN_POSITIVE);
+                let by = by / norm(normal).max(f64::MIN_POSITIVE);
                 [0, 1, 2].map(|k| here[k] + by * normal[k])
             }
         }

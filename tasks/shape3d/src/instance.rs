@@ -1,5 +1,5 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
-use softrast_mesh::Mesh;
+use softrast_mesh::{Mesh, vectors};
 
 /// Elevations of the cameras in degrees, in the order of the seeds; `solve` uses the first.
 pub(crate) const ELEVATIONS_DEG: [f64; 5] = [30.0, 60.0, 0.0, -30.0, -60.0];
@@ -53,12 +53,7 @@ fn rotation(turn: u64) -> [[f64; 3]; 3] {
             break (q, square);
         }
     };
-    let [w, x, y, z] = q.map(|part| part / square.sqrt());
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
+    vectors::rotation(q.map(|part| part / square.sqrt()))
 }
 
 #[cfg(test)]

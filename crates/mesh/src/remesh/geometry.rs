@@ -1,6 +1,7 @@
 use rayon::prelude::*;
 
-use super::{difference, dot, normal};
+use super::normal;
+use crate::vectors::{cross, difference, dot};
 
 /// Least length by which normals are divided; those of vertices whose faces have no area are shorter.
 const LEAST: f32 = 1e-30;
@@ -228,11 +229,6 @@ impl Around {
 fn at(numbers: &[f32], vertex: u32) -> [f32; 3] {
     let start = 3 * vertex as usize;
     [numbers[start], numbers[start + 1], numbers[start + 2]]
-}
-
-#[inline(always)]
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

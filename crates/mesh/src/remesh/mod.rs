@@ -12,7 +12,10 @@ mod split;
 pub use geometry::SurfaceGeometry;
 use half_edges::HalfEdges;
 
-use crate::{Mesh, MeshError};
+use crate::{
+    Mesh, MeshError,
+    vectors::{cross, difference, dot},
+};
 
 /// Edges shorter than this fraction of their target length collapse.
 const SHORTEST: f32 = 0.8;
@@ -203,21 +206,10 @@ fn lengths(numbers: &[f32], width: usize, [a, b]: [u32; 2]) -> [f32; 2] {
     [0.5 * (target(a) + target(b)), dot(along, along).sqrt()]
 }
 
-#[inline(always)]
-fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// Twice the area of a triangle, along its normal.
 #[inline(always)]
 fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
-    let (u, v) = (difference(b, a), difference(c, a));
-    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    cross(difference(b, a), difference(c, a))
 }
 
 /// Quality of a triangle: twice its area over the sum of its squared sides, 0 for a line, 0.29 if equilateral.

@@ -1,4 +1,5 @@
 use anyhow::{bail, ensure};
+use softrast_mesh::vectors::rotation;
 
 /// Largest deviation of entries of `R Rᵀ` from the identity: numbers with three decimals deviate by a fifth of it.
 const MOST_OFF: f64 = 1e-2;
@@ -57,12 +58,7 @@ pub(crate) fn of_quaternion(quaternion: [f64; 4]) -> anyhow::Result<[[f64; 3]; 3
         length.is_normal() && length.recip().is_normal(),
         "the quaternion {quaternion:?} has no direction"
     );
-    let [w, x, y, z] = quaternion.map(|number| number / length);
-    Ok([
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ])
+    Ok(rotation(quaternion.map(|number| number / length)))
 }
 
 /// The quaternion `w + x i + y j + z k` of a rotation, of length 1 and with w at least 0.
