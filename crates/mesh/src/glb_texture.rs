@@ -34,6 +34,7 @@ pub(crate) struct Part<'a> {
 }
 
 /// The texture of the parts placed so far.
+#[derive(Default)]
 pub(crate) struct Unwrapped {
     most: usize,
     coordinates: Vec<[f64; 2]>,
@@ -53,17 +54,8 @@ pub(crate) struct Unwrapped {
 impl Unwrapped {
     /// An empty texture, for a file of `length` bytes.
     pub(crate) fn new(length: usize) -> Self {
-        Self {
-            most: MOST_COORDINATES.max(length).min(u32::MAX as usize),
-            coordinates: Vec::new(),
-            corners: Vec::new(),
-            firsts: HashMap::new(),
-            materials: Vec::new(),
-            numbers: HashMap::new(),
-            of_faces: Vec::new(),
-            nowhere: None,
-            multiplies_colours: false,
-        }
+        let most = MOST_COORDINATES.max(length).min(u32::MAX as usize);
+        Self { most, ..Self::default() }
     }
 
     /// Adds the coordinates and the material of a part; `faces` is the total number of faces.

@@ -23,7 +23,7 @@ use crate::{
     obj_texture::{self, Found},
     parts::Parts,
     polygon::Polygons,
-    statements::{count, statements},
+    statements::{count, number, statements},
 };
 
 /// The mesh in `bytes`; see [`Mesh::parse`]. With the `folder` of the file also its texture.
@@ -158,7 +158,7 @@ fn three<T>(
 }
 
 fn coordinate(word: &str) -> Result<f64, Fault> {
-    let x = word.parse().map_err(|_| Fault::Number(shown(word)))?;
+    let x = number(word)?;
     if fits_f32(x) { Ok(x) } else { Err(Fault::NotFinite(shown(word))) }
 }
 

@@ -12,7 +12,7 @@ use crate::{
     material::to_linear,
     pictures::Pictures,
     referenced::{picture, read, referenced_path},
-    statements::{Statement, count, statements},
+    statements::{Statement, count, number, statements},
     texture::is_near,
 };
 
@@ -208,7 +208,7 @@ fn rest(statement: &Statement) -> String {
 /// (u, v); v is 0 if omitted, a third number is ignored.
 fn coordinate<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 2], Fault> {
     let read = |word: &str| {
-        let x: f64 = word.parse().map_err(|_| Fault::Number(shown(word)))?;
+        let x = number(word)?;
         if is_near(&x) {
             return Ok(x);
         }

@@ -9,7 +9,7 @@ use crate::{
     mesh::finite,
     parts::Parts,
     polygon::Polygons,
-    statements::{Statement, statements},
+    statements::{Statement, number, statements, whole},
 };
 
 const NO_FACES: Trouble =
@@ -122,16 +122,10 @@ impl Header {
     }
 }
 
-fn number(word: &str) -> Result<f64, Fault> {
-    word.parse().map_err(|_| Fault::Number(shown(word)))
-}
-
 /// Adds the polygon of a line: the number of its corners, then their vertices. A colour may follow.
 fn corners(line: &Statement, vertices: usize, polygons: &mut Polygons) -> Result<(), Fault> {
     let mut words = line.words();
-    let not_whole = |word: &str| Fault::format(format!("{:?} is not a whole number", shown(word)));
-    let first = words.next().unwrap_or_default();
-    let arity: u32 = first.parse().map_err(|_| not_whole(first))?;
+    let arity: u32 = whole(words.next().unwrap_or_default())?;
     if arity < 3 {
         return Err(Fault::Corners(arity as usize));
     }
@@ -139,8 +133,8 @@ fn corners(line: &Statement, vertices: usize, polygons: &mut Polygons) -> Result
         let Some(word) = words.next() else {
             return Err(Fault::format(format!("{arity} corners, but the line has {found}")));
         };
-        let index: i64 = word.parse().map_err(|_| not_whole(word))?;
-        let vertex = u32::try_from(index).ok().filter(|&vertex| (vertex as usize) < vertices);
+        let vertex =
+            u32::try_from(whole::<i64>(word)?).ok().filter(|&vertex| (vertex as usize) < vertices);
         let beyond = || Fault::OutOfRange { index: word.to_owned(), vertices };
         polygons.corners.push(vertex.ok_or_else(beyond)?);
     }

@@ -8,13 +8,13 @@ use std::slice::ChunksExact;
 use crate::{
     Fault, Mesh,
     colours::{Beyond, Colours},
-    error::{Place, Trouble, shown},
+    error::{Place, Trouble},
     mesh::finite,
     number::Number,
     parts::Parts,
     ply_header::{Element, Encoding, Header, Property},
     polygon::Polygons,
-    statements::next_line,
+    statements::{next_line, number, whole},
 };
 
 const AXES: [[&str; 2]; 3] = [["x", "x"], ["y", "y"], ["z", "z"]];
@@ -269,13 +269,9 @@ impl<'a> Body<'a> {
     }
 }
 
-/// The value of a word; `whole` for an index or a length.
-fn parsed(word: &str, whole: bool) -> Result<f64, Fault> {
-    if whole {
-        let not_whole = |_| Fault::format(format!("{:?} is not a whole number", shown(word)));
-        return word.parse::<i64>().map(|n| n as f64).map_err(not_whole);
-    }
-    word.parse().map_err(|_| Fault::Number(shown(word)))
+/// The value of a word; `is_whole` for an index or a length.
+fn parsed(word: &str, is_whole: bool) -> Result<f64, Fault> {
+    if is_whole { whole::<i64>(word).map(|n| n as f64) } else { number(word) }
 }
 
 /// The length of a list; the caller checks whether the file has this many entries.

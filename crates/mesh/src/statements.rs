@@ -1,6 +1,8 @@
 //! The statements of an OBJ file: its lines without comments, with continued lines joined.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, str::FromStr};
+
+use crate::{Fault, error::shown};
 
 /// One statement, and the physical line (from 1) on which it starts.
 pub(crate) struct Statement<'a> {
@@ -43,6 +45,14 @@ pub(crate) fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement<'_>> {
 /// Number of statements of `bytes` that start with `keyword`.
 pub(crate) fn count(bytes: &[u8], keyword: &str) -> usize {
     statements(bytes).filter(|statement| statement.words().next() == Some(keyword)).count()
+}
+
+pub(crate) fn number(word: &str) -> Result<f64, Fault> {
+    word.parse().map_err(|_| Fault::Number(shown(word)))
+}
+
+pub(crate) fn whole<T: FromStr>(word: &str) -> Result<T, Fault> {
+    word.parse().map_err(|_| Fault::format(format!("{:?} is not a whole number", shown(word))))
 }
 
 /// Removes the next physical line from `rest`, without its end.

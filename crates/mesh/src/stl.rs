@@ -9,7 +9,7 @@ use crate::{
     error::{Trouble, shown},
     mesh::finite,
     parts::Parts,
-    statements::next_line,
+    statements::{next_line, number},
 };
 
 /// Length of the arbitrary header of a binary file, before the number of triangles.
@@ -134,7 +134,7 @@ fn position<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], Fa
     let mut position = [0.0; 3];
     for (found, x) in position.iter_mut().enumerate() {
         let word = words.next().ok_or(Fault::Coordinates(found))?;
-        *x = word.parse().map_err(|_| Fault::Number(shown(word)))?;
+        *x = number(word)?;
     }
     finite(position)?;
     Ok(position)
