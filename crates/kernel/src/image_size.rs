@@ -1,15 +1,17 @@
+use std::fmt::{self, Display, Formatter};
+
 /// Height and width of an image in pixels.
 ///
 /// NDC have the same scale along both axes: the shorter side of the image is [-1, 1], the longer one extends farther, with its middle at 0.
 /// One pixel is `2 / shorter` wide and high.
 ///
-/// A number converts to a square image, `[height, width]` to any other.
+/// A number converts to a square image, `[height, width]` to any other; shown as "width x height".
 ///
 /// ```
 /// use softrast_kernel::ImageSize;
 ///
 /// let size: ImageSize = [2, 4].into();
-/// assert_eq!((size.shorter(), size.pixels()), (2, 8));
+/// assert_eq!((size.shorter(), size.pixels(), size.to_string()), (2, 8, "4 x 2".to_owned()));
 /// // A pixel is 1 NDC wide; the first row is at the top.
 /// assert_eq!((size.column_centre(0), size.row_centre(0)), (-1.5, 0.5));
 /// ```
@@ -42,6 +44,12 @@ impl ImageSize {
     #[inline]
     pub fn row_centre(self, row: usize) -> f64 {
         (self.height as f64 - 1.0 - 2.0 * row as f64) / self.shorter() as f64
+    }
+}
+
+impl Display for ImageSize {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} x {}", self.width, self.height)
     }
 }
 

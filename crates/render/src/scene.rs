@@ -171,10 +171,7 @@ fn picture(path: &Path, size: usize) -> anyhow::Result<Vec<f64>> {
     let image = GrayImage::from_raw(found.width as u32, found.height as u32, levels);
     let mut image = image.context("a picture of whole rows")?;
     if whole != ImageSize::from(size) {
-        eprintln!(
-            "the target is {} x {} pixels: resized to {size} x {size}",
-            whole.width, whole.height
-        );
+        eprintln!("the target is {whole} pixels: resized to {size} x {size}");
     }
     if found != ImageSize::from(size) {
         image = imageops::resize(&image, size as u32, size as u32, imageops::FilterType::Triangle);

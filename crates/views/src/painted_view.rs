@@ -147,14 +147,7 @@ impl View {
         let of = || {
             let colours = Picture::load_with_opacity(&self.picture)?;
             let (found, mask) = (colours[3].whole_size(), self.mask.whole_size());
-            ensure!(
-                found == mask,
-                "the picture has {} x {} pixels, but its mask {} x {}",
-                found.width,
-                found.height,
-                mask.width,
-                mask.height
-            );
+            ensure!(found == mask, "the picture has {found} pixels, but its mask {mask}");
             Ok(match self.distortion {
                 Some(_) => undistorted(self, colours).map(of_16_bits),
                 None if mask != colours[3].size() => colours.map(of_16_bits),

@@ -46,23 +46,15 @@ impl Views {
             let mask = view.mask.size();
             ensure!(
                 mask == size,
-                "{}: the mask is {} x {}, the picture of its camera {} x {}",
-                view.name,
-                mask.width,
-                mask.height,
-                size.width,
-                size.height
+                "{}: the mask is {mask}, the picture of its camera {size}",
+                view.name
             );
             ensure!(
                 size == other,
-                "views of one size are needed, but {} is {} x {} and {} is {} x {} (width x height): scale or crop the pictures, or draw each view by \
+                "views of one size are needed, but {} is {other} and {} is {size} (width x height): scale or crop the pictures, or draw each view by \
                  itself",
                 first.name,
-                other.width,
-                other.height,
-                view.name,
-                size.width,
-                size.height
+                view.name
             );
         }
         Ok(Self(views))
@@ -104,12 +96,8 @@ impl Views {
                 let found = channel.size();
                 ensure!(
                     found == size,
-                    "{}: the picture is {} x {}, its mask {} x {}",
-                    view.picture.display(),
-                    found.width,
-                    found.height,
-                    size.width,
-                    size.height
+                    "{}: the picture is {found}, its mask {size}",
+                    view.picture.display()
                 );
                 levels.extend(channel.pixels().iter().map(|&level| f64::from(level)));
             }

@@ -173,12 +173,11 @@ impl Lens {
     }
 
     fn check_size(&self, size: ImageSize) -> anyhow::Result<()> {
-        let ImageSize { width, height } = size;
         let differs = |told: Option<f64>, found: usize| told.is_some_and(|x| x != found as f64);
-        if differs(self.w, width) || differs(self.h, height) {
+        if differs(self.w, size.width) || differs(self.h, size.height) {
             let side = |told: Option<f64>| told.map_or("?".to_owned(), |x| x.to_string());
             bail!(
-                "the camera is for pictures of {} x {} pixels, and this one has {width} x {height}: give the picture that the camera was \
+                "the camera is for pictures of {} x {} pixels, and this one has {size}: give the picture that the camera was \
                  calibrated for, or scale fx, fy, cx and cy",
                 side(self.w),
                 side(self.h)
@@ -206,19 +205,19 @@ impl Lens {
 
 /// An error if a camera's numbers are positive but implausible: f32 could not distinguish pixels.
 fn check_sense(camera: &Pinhole) -> anyhow::Result<()> {
-    let ImageSize { width, height } = camera.size;
-    let (shorter, longer) = (camera.size.shorter() as f64, width.max(height) as f64);
+    let size = camera.size;
+    let (shorter, longer) = (size.shorter() as f64, size.width.max(size.height) as f64);
     let (shortest, longest) = (FOCAL_LENGTHS[0] * shorter, FOCAL_LENGTHS[1] * longer);
     for (name, focal) in ["fx", "fy"].into_iter().zip(camera.focal) {
         ensure!(
             (shortest..=longest).contains(&focal),
-            "the focal length {name} is {focal:e} pixels, for a picture of {width} x {height} it must be from {shortest} to {longest:e}"
+            "the focal length {name} is {focal:e} pixels, for a picture of {size} it must be from {shortest} to {longest:e}"
         );
     }
     for (name, centre) in ["cx", "cy"].into_iter().zip(camera.centre) {
         ensure!(
             centre.abs() <= FARTHEST_CENTRE * longer,
-            "{name} is {centre:e} pixels, too far from a picture of {width} x {height}"
+            "{name} is {centre:e} pixels, too far from a picture of {size}"
         );
     }
     Ok(())
