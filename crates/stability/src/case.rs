@@ -11,9 +11,6 @@ pub struct Case {
     pub id: &'static str,
     /// Short description.
     pub name: &'static str,
-    /// Whether the case belongs to the quick part.
-    #[serde(skip)]
-    pub quick: bool,
     /// The scene that is drawn or optimised.
     pub scene: &'static str,
     /// The perturbation, which changes from level to level.

@@ -16,7 +16,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "F24",
         name: "colour of what is hidden",
-        quick: true,
         scene: "a square of two triangles before another of another colour, 24 x 24, depth softness at its default scale",
         perturbation: "gap between the two, 0.01 to 1 of the distance between the planes",
         measure: "largest share of the hidden colour, four pixels and more inside",
@@ -26,7 +25,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "G08",
         name: "gradient of what is hidden",
-        quick: true,
         scene: "as F24, and a picture that shows the hidden colour",
         perturbation: "gap between the two, 0.01 to 1 of the distance between the planes",
         measure: "1 unless the loss falls as the hidden square comes nearer",
@@ -36,7 +34,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O33",
         name: "POSE by colour, by range of the starts",
-        quick: false,
         scene: "POSE by colour, a ball whose silhouette tells nothing, 24 x 24, 80 steps of 1, one start, 8 seeds",
         perturbation: "starts 15-35, 35-55 and 55-75 degrees away",
         measure: "degrees that the returned pose is off",

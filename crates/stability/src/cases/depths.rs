@@ -10,7 +10,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O13",
         name: "OCCLUSION by steps",
-        quick: true,
         scene: "OCCLUSION, 3 quads, 24 x 24, 10 seeds",
         perturbation: "10, 30 and 100 steps",
         measure: "share of pairs of quads in the wrong order",
@@ -20,7 +19,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O14",
         name: "OCCLUSION by depth softness",
-        quick: false,
         scene: "OCCLUSION, 3 quads, 24 x 24, 60 steps, 10 seeds",
         perturbation: "scale of the depth from 1e-3 to 10 (of no effect on the network)",
         measure: "share of pairs of quads in the wrong order",
@@ -30,7 +28,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O23",
         name: "OCCLUSION, eight quads",
-        quick: false,
         scene: "OCCLUSION, transfer: 8 quads, 10 steps, 24 x 24, 10 seeds",
         perturbation: "learning rate from 0.07 to 7",
         measure: "1 if the front quad is wrong",

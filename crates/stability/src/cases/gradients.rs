@@ -11,7 +11,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "F16",
         name: "a square split into triangles",
-        quick: false,
         scene: "a square of 2 to 512 triangles, softness 0.02 NDC",
         perturbation: "length of an edge of its triangles, in scales",
         measure: "how far the outline (coverage 1/2) moves outwards, in scales",
@@ -21,7 +20,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "G01",
         name: "grid offset, upright edge",
-        quick: true,
         scene: "an upright edge moved by sixteenths of a pixel, 32 x 32",
         perturbation: "softness from 0.05 to 1 pixel",
         measure: "largest relative deviation of the gradient from its mean over the offsets",
@@ -31,7 +29,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "G02",
         name: "grid offset, turned edges",
-        quick: false,
         scene: "an edge at 10 angles and 8 offsets, 32 x 32",
         perturbation: "softness from 0.05 to 1 pixel",
         measure: "relative standard deviation of the gradient across the edge",
@@ -41,7 +38,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "G03",
         name: "gradient over image sizes",
-        quick: false,
         scene: "a triangle, softness 0.1 NDC",
         perturbation: "image of 16 to 256 pixels a side",
         measure: "relative difference of the gradient of its mean coverage from that at 256",
@@ -51,7 +47,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "G07",
         name: "dead zone",
-        quick: false,
         scene: "60 small triangles, 32 x 32",
         perturbation: "softness from 1e-4 to 10 pixels",
         measure: "share of the triangles without any gradient",

@@ -16,7 +16,6 @@ use crate::{Case, Level, Tested, Trial, drawing::Exact, planar_scene::PlanarScen
 pub(super) const CASES: &[Case] = &[Case {
     id: "M03",
     name: "meta-gradient through 10 to 200 steps",
-    quick: false,
     scene: "three triangles and a disk, 12 x 12, Adam, f64",
     perturbation: "steps of the inner loop: 10, 50, 100, 200",
     measure: "growth of the adjoint from the last step to the first, in powers of ten, not clipped",

@@ -14,7 +14,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O01",
         name: "decay past the optimum",
-        quick: false,
         scene: "POSE, a lopsided body, 24 x 24, 80 steps of 1, 4 seeds from 15 to 35 degrees",
         perturbation: "softness at the last step from 1e-1 to 1e-7 NDC, from ten times as wide at the \
                        first where it decays",
@@ -25,7 +24,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O03",
         name: "POSE by angle of the start",
-        quick: false,
         scene: "POSE, a lopsided body, 24 x 24, 100 steps of 1.2, 8 directions at the right distance",
         perturbation: "angle between start and target, 5 to 90 degrees",
         measure: "degrees that the pose is off at the best step",
@@ -35,7 +33,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O04",
         name: "POSE by distance of the start",
-        quick: false,
         scene: "POSE, a lopsided body, 24 x 24, 100 steps of 1.2, 8 directions at 20 degrees",
         perturbation: "distance of the start over that of the target, 0.5 to 4",
         measure: "degrees that the pose is off at the best step",
@@ -45,7 +42,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O07",
         name: "POSE by image size",
-        quick: false,
         scene: "POSE, a lopsided body, 80 steps of 1, 4 seeds from 15 to 35 degrees, softness 0.02 NDC",
         perturbation: "image of 8 to 128 pixels a side",
         measure: "degrees that the returned pose is off",
@@ -55,7 +51,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O16",
         name: "POSE by learning rate",
-        quick: false,
         scene: "POSE, a lopsided body, 24 x 24, 80 steps of 1, 4 seeds from 15 to 35 degrees",
         perturbation: "learning rate, about the degrees of a step, from 1e-3 to 10",
         measure: "degrees that the returned pose is off",
@@ -65,7 +60,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O17",
         name: "POSE by range of the starts",
-        quick: false,
         scene: "POSE, a lopsided body, 24 x 24, 80 steps of 1, one start, 8 seeds",
         perturbation: "starts 15-35, 35-55 and 55-75 degrees away",
         measure: "degrees that the returned pose is off",
@@ -75,7 +69,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O22",
         name: "POSE, softness from 1e-12 to 1e3",
-        quick: false,
         scene: "POSE, a lopsided body, 24 x 24, 60 steps of 1, 2 seeds from 15 to 35 degrees",
         perturbation: "softness from 1e-12 to 1e3 NDC",
         measure: "degrees that the returned pose is off",

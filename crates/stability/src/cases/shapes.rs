@@ -18,7 +18,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O10",
         name: "thin spokes",
-        quick: false,
         scene: "2D SHAPE, 60 triangles, 32 x 32, 80 steps; the target is a cross of thin bars",
         perturbation: "width of the bars, 1 to 6 pixels",
         measure: "hard error over that of an empty image",
@@ -28,7 +27,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O11",
         name: "triangles that die",
-        quick: false,
         scene: "2D SHAPE, 80 triangles, letters at 32 x 32, 60 steps without its smoothness",
         perturbation: "softness at the last step from 1e-4 to 0.1 NDC",
         measure: "share of the triangles without any gradient at the end",
@@ -38,7 +36,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O12",
         name: "2D SHAPE by faces",
-        quick: true,
         scene: "2D SHAPE, letters at 32 x 32, 60 steps",
         perturbation: "8 to 512 triangles",
         measure: "hard error",
@@ -48,7 +45,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O29",
         name: "2D SHAPE by learning rate",
-        quick: false,
         scene: "2D SHAPE, 80 triangles, letters at 32 x 32, 60 steps, 2 seeds",
         perturbation: "learning rate from 1e-4 to 1",
         measure: "hard error",
@@ -58,7 +54,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O30",
         name: "2D SHAPE, softness from 1e-12 to 1e3",
-        quick: true,
         scene: "2D SHAPE, 80 triangles, letters at 32 x 32, 40 steps",
         perturbation: "softness from 1e-12 to 1e3 NDC",
         measure: "hard error",
@@ -68,7 +63,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O15",
         name: "3D SHAPE by elevation",
-        quick: false,
         scene: "3D SHAPE, the airplane from a sphere of 80 faces, 24 views of 24 x 24, 30 steps",
         perturbation: "elevation of the cameras: 30, 60, 0, -30, -60 degrees",
         measure: "hard IoU loss",
@@ -78,7 +72,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O31",
         name: "3D SHAPE by softness",
-        quick: false,
         scene: "3D SHAPE, the airplane from a sphere of 80 faces, 24 views of 24 x 24, 20 steps",
         perturbation: "softness at the last step from 1e-6 to 1 NDC",
         measure: "hard IoU loss",

@@ -18,7 +18,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O02",
         name: "starts without overlap",
-        quick: true,
         scene: "a triangle moved over a target triangle, 32 x 32, 100 steps of 0.02, 6 directions",
         perturbation: "distance of their centres, 0 to 1.4 NDC",
         measure: "hard IoU loss at the best step",
@@ -28,7 +27,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O26",
         name: "starts without overlap, wide softness",
-        quick: false,
         scene: "as O02, at a distance of 1 NDC",
         perturbation: "softness from 0.001 to 1 NDC",
         measure: "hard IoU loss at the best step",
@@ -38,7 +36,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O06",
         name: "loss times a factor",
-        quick: true,
         scene: "as O02, at a distance of 0.3 NDC, 30 steps",
         perturbation: "factor of the loss from 1e-8 to 1e8",
         measure: "largest difference of a coordinate from the run with factor 1, in steps",
@@ -48,7 +45,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O08",
         name: "noise in the target",
-        quick: false,
         scene: "as O02, at a distance of 0.2 NDC, 3 seeds of the noise",
         perturbation: "share of pixels that are flipped, 0 to 20 %",
         measure: "hard IoU loss against the target without noise",
@@ -58,7 +54,6 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "O09",
         name: "gray target",
-        quick: false,
         scene: "as O02, at a distance of 0.1 NDC; the target hard or averaged over 8 x 8 places a pixel",
         perturbation: "hard or gray",
         measure: "relative error of the triangle's area at the end",
