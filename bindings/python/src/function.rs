@@ -9,7 +9,7 @@ use std::{
 use pyo3::{prelude::*, types::PyCapsule};
 #[cfg(feature = "cuda")]
 use softrast_raster::Cuda;
-use softrast_raster::low_level::ElementaryOp;
+use softrast_raster::low_level::{ElementaryOp, PixelLoss};
 use softrast_tensor::NdArray;
 
 use crate::{
@@ -101,13 +101,17 @@ pub(crate) fn perspective() -> Function {
 /// Images `[views, height, width]` and targets `[1 or views, height, width]` to mean squared differences `[views]`.
 #[pyfunction]
 pub(crate) fn mse_loss() -> Function {
-    Function::new(Kind::Op(Op::elementary(ElementaryOp::SquaredError), &[3, 3], false))
+    Function::new(Kind::Op(
+        Op::elementary(ElementaryOp::Loss(PixelLoss::SquaredError)),
+        &[3, 3],
+        false,
+    ))
 }
 
 /// Images `[views, height, width]` and targets `[1 or views, height, width]` to one less the overlap over the union, `[views]`.
 #[pyfunction]
 pub(crate) fn iou_loss() -> Function {
-    Function::new(Kind::Op(Op::elementary(ElementaryOp::Iou), &[3, 3], false))
+    Function::new(Kind::Op(Op::elementary(ElementaryOp::Loss(PixelLoss::Iou)), &[3, 3], false))
 }
 
 #[pymethods]

@@ -30,7 +30,7 @@ pub(crate) struct Losses {
 impl Losses {
     /// The loss of a renderer without a surrogate, under the probabilistic sum: others have none of their own.
     pub(crate) fn new(scene: &Arc<Silhouettes>, loss: PixelLoss) -> Option<Self> {
-        let of_images = Op::elementary(ElementaryOp::from(loss));
+        let of_images = Op::elementary(ElementaryOp::Loss(loss));
         let whole =
             scene.t_conorm == TConorm::Probabilistic && scene.renderer.surrogate().is_none();
         whole.then(|| Self { scene: scene.clone(), loss, of_images, drawing: OnceLock::new() })

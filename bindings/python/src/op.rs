@@ -187,10 +187,7 @@ fn misfit(dims: &[Vec<usize>]) -> String {
 impl Kind {
     fn inputs(&self) -> usize {
         match self {
-            Self::Sum(_)
-            | Self::Elementary(
-                ElementaryOp::Perspective | ElementaryOp::SquaredError | ElementaryOp::Iou,
-            ) => 2,
+            Self::Sum(_) | Self::Elementary(ElementaryOp::Perspective | ElementaryOp::Loss(_)) => 2,
             Self::Loss(_) => 3,
             Self::Blend(blend) => 4 + usize::from(blend.texture.is_some()),
             _ => 1,
@@ -230,7 +227,7 @@ impl Kind {
                     _ => return None,
                 }
             }
-            (Self::Elementary(ElementaryOp::SquaredError | ElementaryOp::Iou), [image, target]) => {
+            (Self::Elementary(ElementaryOp::Loss(_)), [image, target]) => {
                 let (&[views @ 1..=usize::MAX, ..], &[held, ..]) = (&image[..], &target[..]) else {
                     return None;
                 };

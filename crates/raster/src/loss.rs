@@ -18,7 +18,7 @@ use crate::{
 ///
 /// Source: docs/notes.md, Losses and errors.
 pub fn iou_loss<B: RasterBackend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
-    compared(ElementaryOp::Iou, image, target)
+    compared(PixelLoss::Iou, image, target)
 }
 
 /// Mean squared difference of each view: `[views, height, width]`, or with channels `[views, channels, height, width]`, to `[views]`.
@@ -31,7 +31,7 @@ pub fn mse_loss<B: RasterBackend, const D: usize>(
     image: Tensor<B, D>,
     target: Tensor<B, D>,
 ) -> Tensor<B, 1> {
-    compared(ElementaryOp::SquaredError, image, target)
+    compared(PixelLoss::SquaredError, image, target)
 }
 
 /// The loss of each view, with an optional weight for each pixel of the image.
@@ -53,14 +53,14 @@ pub(crate) fn loss_of_images<B: RasterBackend>(
 
 /// The loss of each view, in one op; an image with a single view is compared with all views of the other.
 fn compared<B: RasterBackend, const D: usize>(
-    loss: ElementaryOp,
+    loss: PixelLoss,
     image: Tensor<B, D>,
     target: Tensor<B, D>,
 ) -> Tensor<B, 1> {
     let [a, b] = [image.dims()[0], target.dims()[0]];
     let fits = image.dims()[1..] == target.dims()[1..] && (a == b || a == 1 || b == 1);
     assert!(fits, "images {:?} and {:?} cannot be compared", image.dims(), target.dims());
-    elementary(loss, vec![primitive(image), primitive(target)])
+    elementary(ElementaryOp::Loss(loss), vec![primitive(image), primitive(target)])
 }
 
 /// Added to squared lengths before a division or a square root, in squared world units.

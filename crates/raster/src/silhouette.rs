@@ -54,27 +54,14 @@ impl Rasterizer {
     ) -> Silhouette<S> {
         let values: Vec<f64> = phi.to_data().iter().collect();
         match B::ON_HOST {
-            true => self.prepare_on::<B, B, S>(faces, softness, &values),
+            true => self.prepare_for::<B, B, S>(faces.len(), faces, softness, &values),
             // Without host-GPU transfers for every attempt.
-            false => self.prepare_on::<B, HostBackend, S>(faces, softness, &values),
+            false => self.prepare_for::<B, HostBackend, S>(faces.len(), faces, softness, &values),
         }
     }
 
-    /// [`Rasterizer::prepare`] from numbers. Support and knots are chosen on `H`, in f64 if it supports that.
-    ///
-    /// # Panics
-    ///
-    /// If `faces` or the image is empty, or `phi` has the wrong length.
-    pub fn prepare_on<B: RasterBackend, H: Backend, S: Softness>(
-        &self,
-        faces: &Arc<[[u32; 3]]>,
-        softness: S,
-        phi: &[f64],
-    ) -> Silhouette<S> {
-        self.prepare_for::<B, H, S>(faces.len(), faces, softness, phi)
-    }
-
-    /// [`Rasterizer::prepare_on`] with knots for `room` faces, at least the number of faces.
+    /// [`Rasterizer::prepare`] from numbers, with knots for `room` faces, at least the number of faces. Support and knots are chosen on `H`,
+    /// in f64 if it supports that.
     pub(crate) fn prepare_for<B: RasterBackend, H: Backend, S: Softness>(
         &self,
         room: usize,

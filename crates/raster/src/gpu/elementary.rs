@@ -36,7 +36,7 @@ pub(super) fn run<R: CubeRuntime>(
 ) -> Buffer<R> {
     let count = match op {
         ElementaryOp::OrbitMatrix | ElementaryOp::Coverage => 1,
-        ElementaryOp::Perspective | ElementaryOp::SquaredError | ElementaryOp::Iou => 2,
+        ElementaryOp::Perspective | ElementaryOp::Loss(_) => 2,
     };
     let mut inputs: Vec<Buffer<R>> = tensors.into_iter().map(into_contiguous).collect();
     let mut rest = inputs.split_off(count).into_iter();
@@ -108,13 +108,8 @@ impl<R: CubeRuntime> Elementary<R> {
     }
 
     fn shape(&self, op: ElementaryOp) -> Shape {
-        let views = self.views();
-        match op {
-            ElementaryOp::OrbitMatrix => [views, 3, 4].into(),
-            ElementaryOp::Perspective => [views, 3, self.inputs[0].shape()[1]].into(),
-            ElementaryOp::Coverage => self.inputs[0].shape(),
-            ElementaryOp::SquaredError | ElementaryOp::Iou => [views].into(),
-        }
+        let dims: Vec<_> = self.inputs.iter().map(|input| input.shape().to_vec()).collect();
+        op.shape(&dims).into()
     }
 
     /// The result, flat; in a pass of second order its derivative.
@@ -151,7 +146,7 @@ impl<R: CubeRuntime> Elementary<R> {
                 jobs as u32,
                 second,
             ),
-            ElementaryOp::SquaredError | ElementaryOp::Iou => judge::launch(
+            ElementaryOp::Loss(_) => judge::launch(
                 client,
                 self.cubes(views, CUBE),
                 cube,
@@ -229,7 +224,7 @@ impl<R: CubeRuntime> Elementary<R> {
                 jobs as u32,
                 second,
             ),
-            ElementaryOp::SquaredError | ElementaryOp::Iou => to_image::launch(
+            ElementaryOp::Loss(_) => to_image::launch(
                 client,
                 self.cubes(jobs, CUBE),
                 cube,

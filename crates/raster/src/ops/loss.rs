@@ -7,7 +7,7 @@ use softrast_tensor::{Element, TensorData};
 use crate::{
     ProfileSum,
     ops::{
-        elementary::{ElementaryOp, Number, dual_upstream, flat},
+        elementary::{Number, dual_upstream, flat},
         pass::Pass,
     },
 };
@@ -24,16 +24,6 @@ pub struct SilhouetteLoss {
     pub(crate) weighted: bool,
     /// The gradients of the losses, for a recorded op; as many numbers as the vertices have.
     pub(crate) kept: Option<Arc<OnceLock<TensorData>>>,
-}
-
-impl From<PixelLoss> for ElementaryOp {
-    /// The loss as an op of an image and a target.
-    fn from(loss: PixelLoss) -> Self {
-        match loss {
-            PixelLoss::SquaredError => Self::SquaredError,
-            PixelLoss::Iou => Self::Iou,
-        }
-    }
 }
 
 impl SilhouetteLoss {
@@ -131,14 +121,13 @@ impl SilhouetteLoss {
         let sums = F::sums(inputs, bands);
         let image = vec![dims[0][0], self.sum.size.height, self.sum.size.width];
         let shapes = [image, dims[2].clone()];
-        let loss = self.loss.into();
         // `by_sums` does not depend on the motion of the sums; its change along the direction does.
         let still = vec![F::ZERO; sums.len()];
-        let [by_sums, _] = dual_upstream(loss, [&sums, &still], judged, upstream, &shapes);
+        let [by_sums, _] = dual_upstream(self.loss, [&sums, &still], judged, upstream, &shapes);
         let (along, wanted) = ([true, false], [true, false, true]);
         let pulled = F::sums_vjp_of_vjp(inputs, bands, &by_sums, direction, along, wanted);
         let (curved, moved) = pulled.split_at(inputs.vertices.len());
-        let [_, change] = dual_upstream(loss, [&sums, moved], judged, upstream, &shapes);
+        let [_, change] = dual_upstream(self.loss, [&sums, moved], judged, upstream, &shapes);
         let rest = F::sums_vjp(inputs, bands, &change, [true, false]);
         curved.iter().zip(rest).map(|(&a, b)| a + b).collect()
     }

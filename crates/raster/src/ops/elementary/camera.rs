@@ -42,10 +42,6 @@ fn matrix<N: Number>(orbit: &[N]) -> [[N; 4]; 3] {
 }
 
 impl Elementary for OrbitMatrix {
-    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
-        vec![dims[0][0], 3, 4]
-    }
-
     fn forward<N: Number>(&self, inputs: &[&[N]], _: &[Vec<usize>]) -> Vec<N> {
         inputs[0].chunks_exact(4).flat_map(|orbit| matrix(orbit).concat()).collect()
     }
@@ -99,10 +95,6 @@ impl Perspective {
 }
 
 impl Elementary for Perspective {
-    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
-        vec![dims[1][0], 3, dims[0][1]]
-    }
-
     fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N> {
         let (points, count) = (Views::new(inputs[0], &dims[0]), dims[0][1]);
         let mut all = filled(N::of(0.0), 3 * dims[1][0] * count);

@@ -15,10 +15,6 @@ const BESIDE: usize = 16;
 pub(crate) struct Coverage;
 
 impl Elementary for Coverage {
-    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
-        dims[0].clone()
-    }
-
     fn forward<N: Number>(&self, inputs: &[&[N]], _: &[Vec<usize>]) -> Vec<N> {
         let minus = -N::Float::ONE;
         mapped(inputs[0], inputs[0], |sum, _| N::of(1.0) - sum.scale(minus).exp())
@@ -111,7 +107,7 @@ struct Compared<'a, N> {
 impl<'a, N: Number> Compared<'a, N> {
     fn new(inputs: &[&'a [N]], dims: &[Vec<usize>]) -> Self {
         let images = [0, 1].map(|which| Views::new(inputs[which], &dims[which]));
-        Self { images, count: views(dims) }
+        Self { images, count: dims[0][0].max(dims[1][0]) }
     }
 
     /// Both images of a view.
@@ -157,11 +153,6 @@ impl<'a, N: Number> Compared<'a, N> {
     }
 }
 
-/// Number of views of two images, either of which may be one for all.
-fn views(dims: &[Vec<usize>]) -> usize {
-    dims[0][0].max(dims[1][0])
-}
-
 /// Length of an image.
 fn pixels(dims: &[Vec<usize>]) -> usize {
     dims[0][1..].iter().product()
@@ -172,10 +163,6 @@ fn pixels(dims: &[Vec<usize>]) -> usize {
 pub(crate) struct SquaredError;
 
 impl Elementary for SquaredError {
-    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
-        vec![views(dims)]
-    }
-
     fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N> {
         let part = N::Float::ONE / N::Float::from_f64(pixels(dims) as f64);
         Compared::new(inputs, dims).losses(|a, b| {
@@ -217,10 +204,6 @@ impl Iou {
 }
 
 impl Elementary for Iou {
-    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
-        vec![views(dims)]
-    }
-
     fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N> {
         Compared::new(inputs, dims).losses(|a, b| {
             let [overlap, inverse] = Self::of(a, b);

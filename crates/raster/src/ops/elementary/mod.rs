@@ -17,8 +17,6 @@ use super::pass::Pass;
 
 /// An op that is generic over the number type. `dims` are the shapes of the inputs.
 pub(super) trait Elementary: Sync {
-    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize>;
-
     fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N>;
 
     /// The wanted gradients, concatenated.
@@ -31,7 +29,7 @@ pub(super) trait Elementary: Sync {
     ) -> Vec<N>;
 }
 
-/// Runs a pass of an op.
+/// Runs a pass of an op; the result is flat.
 pub(super) fn run<F>(
     op: &impl Elementary,
     pass: &Pass,
@@ -42,7 +40,7 @@ where
     F: Element + Float + Number<Float = F>,
 {
     match pass {
-        Pass::Forward => TensorData::new(op.forward(slices, dims), op.shape(dims)),
+        Pass::Forward => flat(op.forward(slices, dims)),
         Pass::Vjp { wanted } => {
             let (upstream, inputs) = slices.split_last().expect("an upstream");
             flat(op.vjp(inputs, dims, upstream, wanted))

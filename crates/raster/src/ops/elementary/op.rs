@@ -1,6 +1,6 @@
 //! The ops that are generic over the number type.
 
-use softrast_kernel::{Dual, Float, Judged};
+use softrast_kernel::{Dual, Float, Judged, PixelLoss};
 use softrast_tensor::{Element, TensorData};
 
 use super::{
@@ -22,16 +22,24 @@ pub enum ElementaryOp {
     Perspective,
     /// Sums to coverage.
     Coverage,
-    /// Mean squared difference.
-    SquaredError,
-    /// One minus the intersection over union.
-    Iou,
+    /// The loss of an image relative to a target.
+    Loss(PixelLoss),
 }
 
 impl ElementaryOp {
     #[cfg(feature = "gpu")]
     pub(crate) fn is_iou(self) -> bool {
-        matches!(self, Self::Iou)
+        matches!(self, Self::Loss(PixelLoss::Iou))
+    }
+
+    /// The shape of the result.
+    pub(crate) fn shape(self, dims: &[Vec<usize>]) -> Vec<usize> {
+        match self {
+            Self::OrbitMatrix => vec![dims[0][0], 3, 4],
+            Self::Perspective => vec![dims[1][0], 3, dims[0][1]],
+            Self::Coverage => dims[0].clone(),
+            Self::Loss(_) => vec![dims[0][0].max(dims[1][0])],
+        }
     }
 
     /// Runs a pass over `slices` with the shapes `dims`.
@@ -39,20 +47,24 @@ impl ElementaryOp {
     where
         F: Element + Float + Number<Float = F>,
     {
-        match self {
+        let mut result = match self {
             Self::OrbitMatrix => run(&OrbitMatrix, pass, slices, dims),
             Self::Perspective => run(&Perspective, pass, slices, dims),
             Self::Coverage => run(&Coverage, pass, slices, dims),
-            Self::SquaredError => run(&SquaredError, pass, slices, dims),
-            Self::Iou => run(&Iou, pass, slices, dims),
+            Self::Loss(PixelLoss::SquaredError) => run(&SquaredError, pass, slices, dims),
+            Self::Loss(PixelLoss::Iou) => run(&Iou, pass, slices, dims),
+        };
+        if matches!(pass, Pass::Forward) {
+            result.shape = self.shape(dims).into();
         }
+        result
     }
 }
 
 /// The derivatives of `Σ upstream · loss` with respect to sums of profiles `[views, height, width]`, whose coverages a loss compares with a
 /// target, and their derivatives as the sums move by `moved`. `dims` are the shapes of the image and of the target.
 pub(crate) fn dual_upstream<F>(
-    loss: ElementaryOp,
+    loss: PixelLoss,
     [sums, moved]: [&[F]; 2],
     Judged { target, counted }: Judged<F>,
     upstream: &[F],
@@ -72,8 +84,8 @@ where
     }
     let (inputs, wanted) = ([&coverage[..], &target[..]], [true, false]);
     let by_coverage = match loss {
-        ElementaryOp::Iou => Iou.vjp(&inputs, dims, upstream, &wanted),
-        _ => SquaredError.vjp(&inputs, dims, upstream, &wanted),
+        PixelLoss::Iou => Iou.vjp(&inputs, dims, upstream, &wanted),
+        PixelLoss::SquaredError => SquaredError.vjp(&inputs, dims, upstream, &wanted),
     };
     let by_sums = by_coverage.into_iter().zip(slopes).enumerate();
     let by_sums = by_sums.map(|(k, (by, slope))| (by * slope).scale(share(k)));
