@@ -41,7 +41,7 @@ struct Entry {
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum What {
+pub(crate) enum What {
     /// A result, and its possible contents.
     Result(Vec<String>),
     /// A file that a later call continues from: it remains when results are replaced.
@@ -117,22 +117,7 @@ impl Manifest {
         self.files.keys().map(String::as_str)
     }
 
-    /// Lists a result with these possible contents.
-    pub(crate) fn result(&mut self, name: &str, command: &str, contents: Vec<String>) {
-        self.insert(name, command, What::Result(contents));
-    }
-
-    /// Lists a file that a later call continues from.
-    pub(crate) fn kept(&mut self, name: &str, command: &str, contents: Vec<String>) {
-        self.insert(name, command, What::Kept(contents));
-    }
-
-    /// Lists a file that grows.
-    pub(crate) fn journal(&mut self, name: &str, command: &str, begins: &str) {
-        self.insert(name, command, What::Journal(begins.to_owned()));
-    }
-
-    fn insert(&mut self, name: &str, command: &str, what: What) {
+    pub(crate) fn insert(&mut self, name: &str, command: &str, what: What) {
         self.files.insert(name.to_owned(), Entry { by: command.to_owned(), what });
     }
 

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     Error, Inputs,
-    manifest::{MANIFEST, Manifest, Owner, begins, content, content_of, is_name},
+    manifest::{MANIFEST, Manifest, Owner, What, begins, content, content_of, is_name},
 };
 
 /// The folder for the results of a command, in which files appear together, each complete or not at all.
@@ -112,8 +112,9 @@ impl OutputFolder {
             let before = self.check(name, &list)?.then(|| content(&self.file(name)));
             let before = before.transpose().map_err(|reason| self.refused(reason))?;
             let new = content(file.path()).map_err(|reason| self.refused(reason))?;
-            settled.result(name, &self.command, vec![new.clone()]);
-            list.result(name, &self.command, before.into_iter().chain([new]).collect());
+            settled.insert(name, &self.command, What::Result(vec![new.clone()]));
+            let contents = before.into_iter().chain([new]).collect();
+            list.insert(name, &self.command, What::Result(contents));
         }
         let mut stale = Vec::new();
         for name in list.results(&self.command) {
@@ -175,7 +176,7 @@ impl OutputFolder {
         let before = self.check(name, &list)?.then(|| content(&path)).transpose();
         let before = before.map_err(|reason| self.refused(reason))?;
         let contents = before.into_iter().chain([content_of(bytes)]).collect();
-        list.kept(name, &self.command, contents);
+        list.insert(name, &self.command, What::Kept(contents));
         self.write_list(&list)?;
         write_atomically(&path, bytes).map_err(|reason| self.refused(reason))
     }
@@ -188,7 +189,7 @@ impl OutputFolder {
     pub fn adopt(&mut self, name: &str) -> Result<(), Error> {
         let mut list = self.list()?;
         let found = content(&self.file(name)).map_err(|reason| self.refused(reason))?;
-        list.kept(name, &self.command, vec![found]);
+        list.insert(name, &self.command, What::Kept(vec![found]));
         self.check(name, &list)?;
         self.write_list(&list)
     }
@@ -205,7 +206,7 @@ impl OutputFolder {
         let path = self.file(name);
         let is_listed = list.names().any(|listed| listed == name);
         let mut with_it = list.clone();
-        with_it.journal(name, &self.command, begins);
+        with_it.insert(name, &self.command, What::Journal(begins.to_owned()));
         let found = match is_listed || !resumes {
             true => self.check(name, &list),
             false => self.check(name, &with_it),
@@ -218,7 +219,7 @@ impl OutputFolder {
             }
             found => drop(found?),
         }
-        list.journal(name, &self.command, begins);
+        list.insert(name, &self.command, What::Journal(begins.to_owned()));
         self.write_list(&list)?;
         Ok(path)
     }

@@ -3,7 +3,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 use super::*;
 use crate::{
     Error, Inputs,
-    manifest::{MANIFEST, Manifest, content_of},
+    manifest::{MANIFEST, Manifest, What, content_of},
 };
 
 fn names(path: &Path) -> Vec<String> {
@@ -137,7 +137,7 @@ fn a_run_that_was_killed_at_any_moment_locks_nobody_out() {
     let [old, new] = ["old", "new"].map(|text| content_of(text.as_bytes()));
     let mut list = Manifest::of(out).unwrap();
     for name in ["a", "b", "c"] {
-        list.result(name, "pose solve", vec![old.clone(), new.clone()]);
+        list.insert(name, "pose solve", What::Result(vec![old.clone(), new.clone()]));
     }
     // The list exists, and some of the files have their names.
     fs::write(out.join(MANIFEST), list.text()).unwrap();
