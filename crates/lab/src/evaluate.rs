@@ -86,14 +86,13 @@ impl Runner {
         Ok((evaluations, false))
     }
 
-    /// Runs one experiment on all seeds, and scores each run by `of`, which receives the index of the score among the
-    /// metrics; `None` if the numbers become non-finite. `label` is the text of the progress bar.
+    /// Runs one experiment on all seeds; the score of each returned step, `None` if the numbers become non-finite. `label` is the text of
+    /// the progress bar.
     pub(crate) fn score(
         &mut self,
         experiment: &dyn Experiment,
         seeds: &[u64],
         label: &str,
-        of: impl Fn(&Run, usize) -> Option<f64>,
     ) -> anyhow::Result<(Vec<Option<f64>>, Evaluation)> {
         let (evaluations, stopped) = self.evaluate(&[experiment], seeds, false, Some(label))?;
         if stopped {
@@ -101,7 +100,10 @@ impl Runner {
         }
         let score = place(experiment.metrics(), Role::Score);
         let evaluation = evaluations.into_iter().next().unwrap_or_default();
-        let finite = |run: &Run| of(run, score).filter(|_| run.broke_at.is_none());
+        let finite = |run: &Run| {
+            let returned = run.returned(score).filter(|_| run.broke_at.is_none());
+            returned.map(|point| point.values[score])
+        };
         Ok((evaluation.runs.iter().map(finite).collect(), evaluation))
     }
 

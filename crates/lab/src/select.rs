@@ -3,7 +3,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::{
-    Experiment, Run, Runner,
+    Experiment, Runner,
     format::{short, short_or_none},
     mean,
     report::{Report, Table},
@@ -89,8 +89,7 @@ impl Runner {
                 continue;
             }
             let clock = Instant::now();
-            let returned = |run: &Run, score| run.returned(score).map(|point| point.values[score]);
-            let (errors, tried) = self.score(experiment.as_ref(), seeds, &flags, returned)?;
+            let (errors, tried) = self.score(experiment.as_ref(), seeds, &flags)?;
             if !known {
                 spent.push(clock.elapsed().as_secs_f64());
                 budget.left -= spent[spent.len() - 1];

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use anyhow::Context;
 use rand::{SeedableRng, rngs::StdRng};
 
-use crate::{Error, Experiment, Partial, Run, Runner, evaluate::was_interrupted, mean};
+use crate::{Error, Experiment, Partial, Runner, evaluate::was_interrupted, mean};
 
 mod report;
 mod space;
@@ -199,9 +199,8 @@ impl Halving {
         make: &mut MakeSetting<'_>,
     ) -> anyhow::Result<Trial> {
         let experiment = make(setting)?;
-        let returned = |run: &Run, score| run.returned(score).map(|point| point.values[score]);
         let seeds = &self.seeds[..seeds];
-        let (scores, tried) = runner.score(experiment.as_ref(), seeds, label, returned)?;
+        let (scores, tried) = runner.score(experiment.as_ref(), seeds, label)?;
         let successes = tried.runs.iter().filter(|run| run.success).count();
         Ok(Trial { setting: setting.clone(), round, scores, successes, seconds: tried.seconds })
     }
