@@ -75,20 +75,20 @@ impl Looks {
 
 /// Statistics of the levels of a picture, as needed for a mask.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Levels {
+pub(crate) struct LevelRange {
     darkest: f32,
     brightest: f32,
     /// The largest level below the brightest, and the least above the darkest, if there are any.
     next: [Option<f32>; 2],
 }
 
-impl Default for Levels {
+impl Default for LevelRange {
     fn default() -> Self {
         Self { darkest: f32::INFINITY, brightest: f32::NEG_INFINITY, next: [None; 2] }
     }
 }
 
-impl Levels {
+impl LevelRange {
     /// Records the level of a pixel.
     pub(crate) fn see(&mut self, level: f32) {
         if level == self.darkest || level == self.brightest {
@@ -138,7 +138,7 @@ impl MaskRules {
     /// # Errors
     ///
     /// If no pixel would be half white.
-    pub(crate) fn change(&self, levels: &Levels) -> anyhow::Result<(Change, Option<f32>)> {
+    pub(crate) fn change(&self, levels: &LevelRange) -> anyhow::Result<(Change, Option<f32>)> {
         let invert = self.invert;
         let told = move |level: f32| if invert { 1.0 - level } else { level };
         let of_mask = if invert { levels.inverted() } else { *levels };
@@ -171,8 +171,8 @@ impl MaskRules {
 }
 
 /// The brightest level, and a threshold that includes it.
-fn advice(levels: &Levels) -> String {
-    let Levels { brightest, next: [below, _], .. } = *levels;
+fn advice(levels: &LevelRange) -> String {
+    let LevelRange { brightest, next: [below, _], .. } = *levels;
     match below {
         None if brightest == 0.0 => ", all are black".to_owned(),
         None => format!(", all have the level {brightest:.4} (1 is white)"),
@@ -195,8 +195,8 @@ fn between(low: f32, high: f32) -> f64 {
 mod tests {
     use super::*;
 
-    fn levels(all: &[f32]) -> Levels {
-        let mut levels = Levels::default();
+    fn levels(all: &[f32]) -> LevelRange {
+        let mut levels = LevelRange::default();
         all.iter().for_each(|&level| levels.see(level));
         levels
     }

@@ -7,7 +7,7 @@ use anyhow::{Context, anyhow, ensure};
 use super::Picture;
 use crate::{
     MaskRules, PictureFile,
-    mask_rules::{Levels, Looks},
+    mask_rules::{LevelRange, Looks},
     picture_file::{Pixel, luminance},
 };
 
@@ -51,7 +51,7 @@ impl Picture {
         }
         let opaque = file.is_opaque();
         let level = |pixel: Pixel| if opaque { luminance(pixel) } else { pixel[3] };
-        let (mut levels, mut looks) = (Levels::default(), Looks::default());
+        let (mut levels, mut looks) = (LevelRange::default(), Looks::default());
         file.each(|pixel| {
             levels.see(level(pixel));
             looks.see(pixel);
