@@ -4,10 +4,10 @@ use anyhow::{Context, ensure};
 use softrast_mesh::{Edges, Mesh};
 use softrast_meta::{Adam, InnerLoop, descend};
 use softrast_raster::{
-    Attributes, ColourRenderer, HostBackend, NEAR, Pinhole, Pinholes, Projected, Weighting,
-    project, vertex_tensor,
+    Attributes, ColourRenderer, HostBackend, NEAR, Pinhole, Pinholes, Projected, Width, project,
+    vertex_tensor,
 };
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family};
 use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
 
 use crate::{PaintTargets, SolveConfig, Surface};
@@ -67,7 +67,7 @@ pub fn paint_until_stopped(
     let targets = PaintTargets::<B>::new(looks(), size);
     let mean = mean_colour(views).context("colours need a view in which something counts")?;
     let mesh = cut(mesh.clone(), targets.pixels() / views.len() as f64);
-    let (faces, count) = (Arc::from(mesh.faces()), mesh.positions().len());
+    let (faces, count) = (Arc::<[_]>::from(mesh.faces()), mesh.positions().len());
 
     let camera = |(v, [left, top, extent]): (&PaintedView, [f64; 3])| {
         v.view.camera.cropped([left, top], [extent; 2], size)
@@ -79,7 +79,7 @@ pub fn paint_until_stopped(
     let device = Default::default();
     let corners = vertex_tensor::<HostBackend>(framed.positions(), &device);
     let seen = project(corners, Pinholes::new(&cameras, &device));
-    let renderer = renderer(&framed, &faces, size, numbers(seen.clone().tensor().narrow(2, 2, 1)))?;
+    let renderer = renderer(&framed, size, numbers(seen.clone().tensor().narrow(2, 2, 1)))?;
     let background = renderer.background::<B>(&[0.0; 3], &device);
     let surface = Surface::<B>::of_edges(&Edges::new(&faces), count, &Default::default());
 
@@ -134,12 +134,7 @@ fn cut(mut mesh: Mesh, pixels: f64) -> Mesh {
 }
 
 /// The renderer for a mesh with these vertex depths over all views.
-fn renderer(
-    mesh: &Mesh,
-    faces: &Arc<[[u32; 3]]>,
-    size: usize,
-    depths: Vec<f64>,
-) -> anyhow::Result<ColourRenderer> {
+fn renderer(mesh: &Mesh, size: usize, depths: Vec<f64>) -> anyhow::Result<ColourRenderer> {
     let before = depths.into_iter().filter(|&depth| depth >= NEAR);
     let ends = [f64::INFINITY, f64::NEG_INFINITY];
     let [near, far] = before.fold(ends, |[near, far], depth| [near.min(depth), far.max(depth)]);
@@ -148,12 +143,10 @@ fn renderer(
     let [low, high] = mesh.bounds();
     let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
     ensure!(longest > 0.0, "the mesh has no extent: all its vertices are in one place");
-    let edge = EdgeSoftness::new(Family::Uniform);
+    let (edge, width) = (EdgeSoftness::new(Family::Uniform), Width::pixels(EDGE_PX));
     let depth = DepthSoftness::Family(Family::Exp);
-    let scales = [EDGE_PX * 2.0 / size as f64, DEPTH * longest / (planes[1] - planes[0])];
-    let phi = [edge.default_phi(scales[0]), depth.default_phi(scales[1])];
-    let weighting = Weighting { edge, depth, planes };
-    Ok(ColourRenderer::with_weighting(faces.clone(), size, weighting, phi))
+    Ok(ColourRenderer::new(mesh.faces(), size, edge, width, planes)
+        .with_depth(depth, DEPTH * longest / (planes[1] - planes[0])))
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use softrast_raster::{
-    Attributes, ColourRenderer, Projected, RasterBackend, Weighting, nearest_faces, vertex_tensor,
+    Attributes, ColourRenderer, Projected, RasterBackend, Width, nearest_faces, vertex_tensor,
 };
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family};
 use softrast_tensor::{Tensor, TensorData, numbers};
 
 const EDGE: EdgeSoftness = EdgeSoftness::new(Family::Uniform);
@@ -71,12 +71,8 @@ impl<B: RasterBackend> VertexColours<B> {
         let seen = Tensor::cat(vec![seen.narrow(2, 0, 2), depth], 2);
         let mut kept = self.renderers.borrow_mut();
         let renderer = kept.entry(side).or_insert_with(|| {
-            let phi = [
-                EDGE.default_phi(EDGE_PX * 2.0 / side as f64),
-                DEPTH.default_phi(DEPTH_SCALE / (PLANES[1] - PLANES[0])),
-            ];
-            let weighting = Weighting { edge: EDGE, depth: DEPTH, planes: PLANES };
-            ColourRenderer::with_weighting(self.faces.clone(), side, weighting, phi)
+            ColourRenderer::new(&self.faces, side, EDGE, Width::pixels(EDGE_PX), PLANES)
+                .with_depth(DEPTH, DEPTH_SCALE / (PLANES[1] - PLANES[0]))
                 .with_tolerance(TOLERANCE)
         });
         let background = renderer.background(&[0.0; 3], &seen.device());
