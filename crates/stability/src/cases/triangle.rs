@@ -214,8 +214,7 @@ fn no_overlap(tested: &Tested) -> anyhow::Result<Vec<Level>> {
             let end = Moved { distance, direction, ..MOVED }.run(tested, &target())?;
             Ok(Trial::at_most(end.lowest(0), 0.15).with(&end.numbers))
         };
-        let trials: anyhow::Result<Vec<Trial>> = (0..6).map(trial).collect();
-        Ok(Level::new(distance, trials?))
+        Ok(Level::new(distance, (0..6).map(trial).collect::<anyhow::Result<_>>()?))
     })
 }
 
@@ -225,8 +224,7 @@ fn widths(tested: &Tested) -> anyhow::Result<Vec<Level>> {
             let end = Moved { scale, distance: 1.0, direction, ..MOVED }.run(tested, &target())?;
             Ok(Trial::at_most(end.lowest(0), 0.15).with(&end.numbers))
         };
-        let trials: anyhow::Result<Vec<Trial>> = (0..4).map(trial).collect();
-        Ok(Level::new(scale, trials?))
+        Ok(Level::new(scale, (0..4).map(trial).collect::<anyhow::Result<_>>()?))
     })
 }
 
@@ -255,8 +253,7 @@ fn noise(tested: &Tested) -> anyhow::Result<Vec<Level>> {
             let off = numbers(iou_loss(found, image(clean.clone())))[0];
             Ok(Trial::at_most(off, 0.2).with(&end.numbers))
         };
-        let trials: anyhow::Result<Vec<Trial>> = (0..3).map(trial).collect();
-        Ok(Level::new(share, trials?))
+        Ok(Level::new(share, (0..3).map(trial).collect::<anyhow::Result<_>>()?))
     })
 }
 
