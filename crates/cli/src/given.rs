@@ -6,13 +6,14 @@ use anyhow::Context;
 
 use softrast_inverse::{Method, ScheduledSoftness};
 use softrast_lab::{
-    Error, Progress, ViewerView, mask_png,
+    Error, Progress, Viewer, ViewerView, mask_png,
     parse::share,
     program::Output,
     report::{Beside, Report},
 };
-use softrast_raster::{BackendChoice, Pinhole};
-use softrast_views::{MaskRules, Picture, find_mask};
+use softrast_mesh::Mesh;
+use softrast_raster::{BackendChoice, ImageSize, Pinhole};
+use softrast_views::{Frame, MaskRules, Picture, find_mask};
 
 use crate::{
     Common, MethodArgs, Scales, SoftnessChoice, backend,
@@ -173,28 +174,29 @@ impl MaskFlags {
     }
 }
 
-/// A camera and its mask, for a page that shows them with a mesh.
+/// A mesh with views of it, for a page: the name, camera, mask and note of each. The page opens with view `opens`.
 ///
 /// # Errors
 ///
-/// If the mask cannot be encoded.
-pub fn seen_by(
-    name: String,
-    camera: &Pinhole,
-    mask: &Picture,
-    note: String,
-) -> anyhow::Result<ViewerView> {
-    let Pinhole { rotation, translation, focal, centre, size } = *camera;
-    let mask_png = mask_png(mask.pixels(), mask.size().width)?;
-    Ok(ViewerView {
-        name,
-        rotation,
-        translation,
-        focal,
-        centre,
-        width: size.width,
-        height: size.height,
-        mask_png,
-        note,
+/// If a mask cannot be encoded.
+pub fn viewer<'a>(
+    mesh: &Mesh,
+    views: impl Iterator<Item = (String, &'a Pinhole, &'a Picture, String)>,
+    opens: Option<usize>,
+) -> anyhow::Result<Viewer> {
+    // A page stores coordinates in 32 bits.
+    let frame = Frame::of_mesh(mesh);
+    let view = |(name, camera, mask, note): (_, &Pinhole, &Picture, _)| {
+        let Pinhole { rotation, translation, focal, centre, size } = frame.camera(camera);
+        let ImageSize { height, width } = size;
+        let mask_png = mask_png(mask.pixels(), mask.size().width)?;
+        Ok(ViewerView { name, rotation, translation, focal, centre, width, height, mask_png, note })
+    };
+    Ok(Viewer {
+        positions: mesh.positions().iter().map(|&p| frame.point(p)).collect(),
+        faces: mesh.faces().to_vec(),
+        colours: mesh.colours().map(<[_]>::to_vec),
+        views: views.map(view).collect::<anyhow::Result<_>>()?,
+        opens,
     })
 }

@@ -7,7 +7,7 @@ use std::{
 
 use image::RgbImage;
 use serde_json::{Value, json};
-use softrast_cli::{Answer, seen_by};
+use softrast_cli::Answer;
 use softrast_inverse::{
     pose::{FoundPose, Symmetry},
     silhouette_pixels,
@@ -300,23 +300,15 @@ fn picture_and_mesh(mesh: &Mesh, one: &Solved) -> Option<[RgbImage; 2]> {
 
 /// The mesh with all poses; opens with the view of a single one.
 fn viewer(mesh: &Mesh, solved: &[Solved], single: bool) -> anyhow::Result<Viewer> {
-    // A page stores coordinates in 32 bits.
-    let frame = Frame::of_mesh(mesh);
     let views = solved.iter().flat_map(|Solved { path, mask, poses, .. }| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         poses.iter().enumerate().map(move |(rank, FoundPose { camera, iou, .. })| {
             let name =
                 if rank == 0 { name.to_string() } else { format!("{name}, alternative {rank}") };
-            seen_by(name, &frame.camera(camera), mask, format!("IoU {iou:.4}"))
+            (name, camera, mask, format!("IoU {iou:.4}"))
         })
     });
-    Ok(Viewer {
-        positions: mesh.positions().iter().map(|&p| frame.point(p)).collect(),
-        faces: mesh.faces().to_vec(),
-        colours: mesh.colours().map(<[_]>::to_vec),
-        views: views.collect::<anyhow::Result<_>>()?,
-        opens: single.then_some(0),
-    })
+    softrast_cli::viewer(mesh, views, single.then_some(0))
 }
 
 fn text(Framed { name, frame, .. }: &Framed, solved: &[Solved], single: bool) -> Vec<String> {

@@ -4,16 +4,16 @@ use std::path::PathBuf;
 
 use image::RgbImage;
 use serde_json::{Value, json};
-use softrast_cli::{Answer, Given, seen_by};
+use softrast_cli::{Answer, Given, viewer};
 use softrast_lab::{
-    Viewer, contact_sheet,
+    contact_sheet,
     format::{counted, fit, line},
     png,
     program::Output,
     report::{Beside, Labelled, Report, Table},
 };
 use softrast_mesh::Mesh;
-use softrast_views::{Frame, View, faces_across_note};
+use softrast_views::{View, faces_across_note};
 
 use super::{painted::Colours, textured::Textured};
 use crate::Args;
@@ -222,25 +222,11 @@ fn page(
     let mut page = Report::new("shape3d", about);
     page.verdict(&verdict(mesh, summary));
     page.warnings(warnings);
-    // A page stores coordinates in 32 bits.
-    let frame = Frame::of_mesh(mesh);
-    let views = scored.iter().map(|one| {
-        seen_by(
-            one.view.name.clone(),
-            &frame.camera(&one.view.camera),
-            &one.view.mask,
-            one.scores(),
-        )
-    });
-    let viewer = Viewer {
-        positions: mesh.positions().iter().map(|&p| frame.point(p)).collect(),
-        faces: mesh.faces().to_vec(),
-        colours: mesh.colours().map(<[_]>::to_vec),
-        views: views.collect::<anyhow::Result<_>>()?,
-        opens: None,
-    };
+    let views = scored
+        .iter()
+        .map(|one| (one.view.name.clone(), &one.view.camera, &one.view.mask, one.scores()));
     page.viewer(
-        &viewer,
+        &viewer(mesh, views, None)?,
         pictures.colours.as_ref().unwrap_or(&pictures.views),
         "The mesh and the cameras. Choose a view to look through its camera, with the outline of the mask.",
     );
