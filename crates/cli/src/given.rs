@@ -3,17 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-
+use image::RgbImage;
 use softrast_inverse::{Method, ScheduledSoftness};
 use softrast_lab::{
-    Error, Progress, Viewer, ViewerView, mask_png,
+    Error, Progress, Viewer, ViewerView, for_page, mask_png,
     parse::share,
     program::Output,
     report::{Beside, Report},
+    rgb_from_planes,
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{BackendChoice, ImageSize, Pinhole};
-use softrast_views::{Frame, MaskRules, Picture, find_mask};
+use softrast_views::{Frame, MaskRules, PaintedView, Picture, find_mask};
 
 use crate::{
     Common, MethodArgs, Scales, SoftnessChoice, backend,
@@ -199,4 +200,13 @@ pub fn viewer<'a>(
         views: views.map(view).collect::<anyhow::Result<_>>()?,
         opens,
     })
+}
+
+/// The picture of a view, and colours drawn from its camera, red, green, blue and coverage, both over black for a page.
+pub fn beside(view: &PaintedView, [red, green, blue, _]: [Vec<f64>; 4]) -> [RgbImage; 2] {
+    let ImageSize { height, width } = view.view.camera.size;
+    let channels = view.over_black();
+    let picture = channels.iter().flat_map(|channel| channel.pixels());
+    let planes = [picture.map(|&x| f64::from(x)).collect(), [red, green, blue].concat()];
+    planes.map(|planes: Vec<f64>| for_page(rgb_from_planes(&planes, width, height)))
 }

@@ -36,7 +36,7 @@ pub use experiment::{Purpose, TaskExperiment};
 pub use flags::{
     Common, EXPERIMENTS, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args,
 };
-pub use given::{Answer, Given, MaskFlags, viewer};
+pub use given::{Answer, Given, MaskFlags, beside, viewer};
 pub use method::{Scales, is_preset, is_preset_learned, learned_kind, method_colour};
 pub use paper::{InOurUnits, Paper};
 pub use program::{execute, main, main_of_two};

@@ -18,7 +18,7 @@ use softrast_lab::{
     overlay, png,
     program::Output,
     report::{Beside, Labelled, Report, Table},
-    rgb_from_planes, shown,
+    shown,
 };
 use softrast_mesh::Mesh;
 use softrast_raster::Pinhole;
@@ -288,14 +288,7 @@ fn drawn(mesh: &Mesh, one: &Solved, pose: &FoundPose) -> RgbImage {
 /// The colours of a picture, and those of the mesh at its best pose.
 fn picture_and_mesh(mesh: &Mesh, one: &Solved) -> Option<[RgbImage; 2]> {
     let view = one.painted.as_ref()?;
-    let camera = &one.poses[0].camera;
-    let channels = view.over_black();
-    let picture = channels.iter().flat_map(|channel| channel.pixels());
-    let [red, green, blue, _] = coloured_pixels(mesh, camera);
-    let planes = [picture.map(|&x| f64::from(x)).collect(), [red, green, blue].concat()];
-    Some(planes.map(|planes: Vec<f64>| {
-        for_page(rgb_from_planes(&planes, camera.size.width, camera.size.height))
-    }))
+    Some(softrast_cli::beside(view, coloured_pixels(mesh, &one.poses[0].camera)))
 }
 
 /// The mesh with all poses; opens with the view of a single one.

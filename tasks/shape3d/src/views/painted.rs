@@ -1,11 +1,9 @@
 //! Colours of a mesh whose shape has been found, or is known.
 
 use image::RgbImage;
-use softrast_cli::Given;
+use softrast_cli::{Given, beside};
 use softrast_inverse::{SolveConfig, paint};
-use softrast_lab::{for_page, rgb_from_planes};
 use softrast_mesh::Mesh;
-use softrast_raster::ImageSize;
 use softrast_views::{PaintedView, coloured_pixels};
 
 use super::textured::Textured;
@@ -30,18 +28,12 @@ pub(super) struct Colours {
 impl Colours {
     /// Colours of a mesh with colours at its vertices, and of one with the texture.
     pub(super) fn new(view: &PaintedView, mesh: &Mesh, textured: Option<&Textured>) -> Self {
-        let ImageSize { height, width } = view.view.camera.size;
-        let image = |planes: Vec<f64>| for_page(rgb_from_planes(&planes, width, height));
         let camera = &view.view.camera;
         let of_vertices = coloured_pixels(mesh, camera);
         let psnr_of_vertices = view.psnr_of(&of_vertices);
         let drawn = textured.and_then(|textured| textured.pixels(camera)).unwrap_or(of_vertices);
         let psnr = view.psnr_of(&drawn);
-        let channels = view.over_black();
-        let picture = channels.iter().flat_map(|channel| channel.pixels());
-        let picture = image(picture.map(|&x| f64::from(x)).collect());
-        let [red, green, blue, _] = drawn;
-        Self { psnr, psnr_of_vertices, pair: [picture, image([red, green, blue].concat())] }
+        Self { psnr, psnr_of_vertices, pair: beside(view, drawn) }
     }
 }
 
