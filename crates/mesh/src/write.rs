@@ -55,6 +55,22 @@ impl Mesh {
         glb_writer::origin(self)
     }
 
+    /// The function for the bytes of a file with the extension of `path`: OBJ, PLY or GLB, in any case.
+    ///
+    /// # Errors
+    ///
+    /// If the path has another extension.
+    pub fn writer(path: &Path) -> Result<fn(&Self) -> Vec<u8>, MeshError> {
+        match Format::of(path) {
+            Some(Format::Obj) => Ok(|mesh| mesh.to_obj().into_bytes()),
+            Some(Format::Ply) => Ok(Self::to_ply),
+            Some(Format::Glb) => Ok(Self::to_glb),
+            Some(Format::Stl | Format::Off | Format::Gltf) | None => {
+                Err(MeshError::NotWritten { path: path.into() })
+            }
+        }
+    }
+
     /// Writes the mesh to a file at `path`: OBJ, PLY or GLB by its extension, in any case.
     ///
     /// [`Mesh::load`] reads OBJ back unchanged, PLY with colours rounded to 8 bits, GLB with all numbers rounded to 32 bits;
@@ -70,14 +86,7 @@ impl Mesh {
     /// If a GLB file would have 4 GiB or more.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), MeshError> {
         let path = path.as_ref();
-        let bytes = match Format::of(path) {
-            Some(Format::Obj) => self.to_obj().into_bytes(),
-            Some(Format::Ply) => self.to_ply(),
-            Some(Format::Glb) => self.to_glb(),
-            Some(Format::Stl | Format::Off | Format::Gltf) | None => {
-                return Err(MeshError::NotWritten { path: path.into() });
-            }
-        };
+        let bytes = Self::writer(path)?(self);
         write(path, &bytes).map_err(|reason| MeshError::Write { path: path.into(), reason })
     }
 }

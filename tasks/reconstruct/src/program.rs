@@ -1,8 +1,4 @@
-use std::{
-    ffi::{OsStr, OsString},
-    io::Write,
-    path::Path,
-};
+use std::{ffi::OsString, io::Write, path::Path};
 
 use anyhow::{Context, ensure};
 use clap::CommandFactory;
@@ -13,7 +9,7 @@ use softrast_lab::{
     program::{Output, parse, repeated, say},
     shown,
 };
-use softrast_mesh::{Mesh, MeshError};
+use softrast_mesh::Mesh;
 use softrast_raster::{BackendChoice, RasterBackend, compiled_backends, on_backend};
 
 use crate::{
@@ -151,7 +147,7 @@ fn predict_mesh<B: RasterBackend>(
     device: &B::Device,
 ) -> anyhow::Result<Output> {
     inputs.add(&args.checkpoint);
-    let write = writer(&args.out)?;
+    let write = Mesh::writer(&args.out)?;
     let out = OutputFile::open(&args.out, "mesh", |path| Mesh::load(path).is_ok(), &inputs)?;
     let (_, network) = trained::<B>(&args.checkpoint, device)?;
     let picture = read_picture(&args.picture)?;
@@ -164,17 +160,6 @@ fn predict_mesh<B: RasterBackend>(
     let text = vec![format!("{vertices} vertices, {faces} faces: {}", args.out.display())];
     let json = json!({ "vertices": vertices, "faces": faces, "mesh": shown(&args.out) });
     Ok(Output { json, text, ..Output::default() })
-}
-
-/// The writer of a mesh file, by its extension.
-fn writer(path: &Path) -> Result<fn(&Mesh) -> Vec<u8>, MeshError> {
-    let ending = path.extension().map(OsStr::to_ascii_lowercase);
-    match ending.as_deref().and_then(OsStr::to_str) {
-        Some("obj") => Ok(|mesh| mesh.to_obj().into_bytes()),
-        Some("ply") => Ok(Mesh::to_ply),
-        Some("glb") => Ok(Mesh::to_glb),
-        _ => Err(MeshError::NotWritten { path: path.into() }),
-    }
 }
 
 /// A picture file as input of the network: planes of red, green, blue and alpha, `[4 * 64 * 64]`.
