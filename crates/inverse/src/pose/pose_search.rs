@@ -6,13 +6,10 @@ use softrast_views::{PaintedView, Picture};
 
 use super::{
     found::FoundPose,
-    search::{Search, check, steps_of_starts},
+    search::{Search, Settings, check, steps_of_starts},
     target::Target,
 };
 use crate::{Method, ScheduledSoftness};
-
-/// Default steps at high resolution: by a mask, and by colours. Only silhouettes are refined by least squares afterwards.
-const FINE_STEPS: [usize; 2] = [20, 80];
 
 /// A function that receives the number of each step, the least loss, and the pose that fits best so far.
 type Visit<'a> = Box<dyn FnMut(usize, f64, &Pinhole) -> anyhow::Result<()> + 'a>;
@@ -40,10 +37,7 @@ pub struct PoseSearch<'a, S = EdgeSoftness> {
     mesh: &'a Mesh,
     camera: Pinhole,
     started: bool,
-    fine_steps: Option<usize>,
-    fine_size: usize,
-    learning_rate: f64,
-    optimise_fov: bool,
+    settings: Settings,
     method: Method<S>,
     visit: Visit<'a>,
 }
@@ -61,10 +55,12 @@ impl<'a> PoseSearch<'a> {
             mesh,
             camera: lens,
             started: false,
-            fine_steps: None,
-            fine_size: 128,
-            learning_rate: Self::LEARNING_RATE,
-            optimise_fov: false,
+            settings: Settings {
+                fine_steps: None,
+                fine_size: 128,
+                learning_rate: Self::LEARNING_RATE,
+                optimise_fov: false,
+            },
             method: Method::new("learned", learned),
             visit: Box::new(|_, _, _| Ok(())),
         }
@@ -87,42 +83,37 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
 
     /// Sets the number of steps at high resolution: 20 by default, 80 by colour.
     #[must_use]
-    pub fn with_fine_steps(self, steps: usize) -> Self {
-        Self { fine_steps: Some(steps), ..self }
+    pub fn with_fine_steps(mut self, steps: usize) -> Self {
+        self.settings.fine_steps = Some(steps);
+        self
     }
 
     /// Sets the pixels a side at high resolution, 128 by default.
     #[must_use]
-    pub fn with_fine_size(self, size: usize) -> Self {
-        Self { fine_size: size, ..self }
+    pub fn with_fine_size(mut self, size: usize) -> Self {
+        self.settings.fine_size = size;
+        self
     }
 
     /// Sets the learning rate at low resolution, in radians; at high resolution it is a third of that.
     #[must_use]
-    pub fn with_learning_rate(self, learning_rate: f64) -> Self {
-        Self { learning_rate, ..self }
+    pub fn with_learning_rate(mut self, learning_rate: f64) -> Self {
+        self.settings.learning_rate = learning_rate;
+        self
     }
 
     /// Also optimises the focal length, from the poses found with the given one; the better of both are returned.
     #[must_use]
-    pub fn optimising_fov(self) -> Self {
-        Self { optimise_fov: true, ..self }
+    pub fn optimising_fov(mut self) -> Self {
+        self.settings.optimise_fov = true;
+        self
     }
 
     /// Sets the softness.
     #[must_use]
     pub fn with_method<T: Softness>(self, method: Method<T>) -> PoseSearch<'a, T> {
-        PoseSearch {
-            mesh: self.mesh,
-            camera: self.camera,
-            started: self.started,
-            fine_steps: self.fine_steps,
-            fine_size: self.fine_size,
-            learning_rate: self.learning_rate,
-            optimise_fov: self.optimise_fov,
-            method,
-            visit: self.visit,
-        }
+        let Self { mesh, camera, started, settings, visit, .. } = self;
+        PoseSearch { mesh, camera, started, settings, method, visit }
     }
 
     /// Passes the number of each step and the smallest loss to `visit`. An error of it ends the search.
@@ -143,12 +134,12 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
 
     /// Number of steps of [`run`](Self::run) for a mask.
     pub fn steps(&self, mask: &Picture) -> usize {
-        self.search(false).steps(mask, false, self.started)
+        self.settings.steps(mask, false, self.started)
     }
 
     /// Number of steps of [`run_by_colour`](Self::run_by_colour) for a view.
     pub fn steps_by_colour(&self, view: &PaintedView) -> usize {
-        self.search(true).steps(&view.view.mask, true, self.started)
+        self.settings.steps(&view.view.mask, true, self.started)
     }
 
     /// Checks the inputs of [`run`](Self::run).
@@ -169,7 +160,7 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
     /// # Errors
     ///
     /// The errors of [`check`](Self::check), of the progress function and of the device.
-    pub fn run<B: RasterBackend>(mut self, mask: &Picture) -> anyhow::Result<Vec<FoundPose>> {
+    pub fn run<B: RasterBackend>(self, mask: &Picture) -> anyhow::Result<Vec<FoundPose>> {
         self.found::<B>(&Target::new(mask, None)?)
     }
 
@@ -182,7 +173,7 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
     /// The errors of [`run`](Self::run); if the mesh has no colours, or no pixel of the view has a colour.
     #[doc(alias = "run_by_color")]
     pub fn run_by_colour<B: RasterBackend>(
-        mut self,
+        self,
         view: &PaintedView,
     ) -> anyhow::Result<Vec<FoundPose>> {
         ensure!(self.mesh.colours().is_some(), "the mesh has no colours at its vertices");
@@ -195,23 +186,15 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
     /// # Errors
     ///
     /// The errors of [`run`](Self::run).
-    pub fn starts<B: RasterBackend>(mut self, mask: &Picture) -> anyhow::Result<Vec<Pinhole>> {
-        let search = self.search(false);
-        search.starts::<B>(self.mesh, mask, &self.camera, &self.method, &mut self.visit)
+    pub fn starts<B: RasterBackend>(self, mask: &Picture) -> anyhow::Result<Vec<Pinhole>> {
+        let Self { mesh, camera, settings, method, mut visit, .. } = self;
+        let target = &Target::new(mask, None)?;
+        Search { settings, mesh, target, camera, method: &method }.starts::<B>(&mut visit)
     }
 
-    fn search(&self, by_colour: bool) -> Search {
-        Search {
-            fine_steps: self.fine_steps.unwrap_or(FINE_STEPS[usize::from(by_colour)]),
-            fine_size: self.fine_size,
-            learning_rate: self.learning_rate,
-            optimise_fov: self.optimise_fov,
-        }
-    }
-
-    fn found<B: RasterBackend>(&mut self, target: &Target<'_>) -> anyhow::Result<Vec<FoundPose>> {
-        let search = self.search(target.painted.is_some());
-        let Self { mesh, camera, started, method, visit, .. } = self;
-        search.found::<B>(mesh, target, camera, *started, method, visit)
+    fn found<B: RasterBackend>(self, target: &Target<'_>) -> anyhow::Result<Vec<FoundPose>> {
+        let Self { mesh, camera, started, settings, method, mut visit } = self;
+        let search = Search { settings, mesh, target, camera, method: &method };
+        search.found::<B>(started, &mut visit)
     }
 }

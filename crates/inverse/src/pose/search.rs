@@ -69,16 +69,28 @@ const SHARPENING_STEPS: usize = 16;
 const ZOOMS: [f64; 3] = [0.65, 1.0, 1.5];
 const NEAREST: f64 = 1.2;
 
+/// Default steps at high resolution: by a mask, and by colours. Only silhouettes are refined by least squares afterwards.
+const FINE_STEPS: [usize; 2] = [20, 80];
+
 /// Settings of a search for poses; see [`PoseSearch`](super::PoseSearch).
 #[derive(Clone, Copy)]
-pub(super) struct Search {
-    /// Steps at high resolution.
-    pub(super) fine_steps: usize,
+pub(super) struct Settings {
+    /// Steps at high resolution, instead of [`FINE_STEPS`].
+    pub(super) fine_steps: Option<usize>,
     /// Pixels a side at high resolution.
     pub(super) fine_size: usize,
     /// Learning rate at low resolution, in radians; at high resolution it is a third of that.
     pub(super) learning_rate: f64,
     pub(super) optimise_fov: bool,
+}
+
+/// A search for the poses of a mesh that fit a target. The camera has the intrinsics, and may have the pose to start from.
+pub(super) struct Search<'a, S> {
+    pub(super) settings: Settings,
+    pub(super) mesh: &'a Mesh,
+    pub(super) target: &'a Target<'a>,
+    pub(super) camera: Pinhole,
+    pub(super) method: &'a Method<S>,
 }
 
 /// Steps of the search for starts, without a given start.
@@ -105,64 +117,70 @@ pub(super) fn check(
     Ok(())
 }
 
-impl Search {
+impl Settings {
+    fn fine_steps(&self, painted: bool) -> usize {
+        self.fine_steps.unwrap_or(FINE_STEPS[usize::from(painted)])
+    }
+
     /// Steps of a search for a mask, or by colour if `painted`; from a given start, or without.
     pub(super) fn steps(&self, mask: &Picture, painted: bool, started: bool) -> usize {
         let Stages { last, .. } = Stages::of(!cut_sides(mask).is_empty());
-        let fine = (1 + usize::from(last > 0)) * self.fine_steps;
+        let fine_steps = self.fine_steps(painted);
+        let fine = (1 + usize::from(last > 0)) * fine_steps;
         let last = match painted {
             false => SHARPENING_STEPS,
-            true if self.optimise_fov => self.fine_steps,
+            true if self.optimise_fov => fine_steps,
             true => 0,
         };
         fine + last + if started { 0 } else { steps_of_starts(mask) }
     }
+}
 
-    /// The poses that fit the target, best first. `camera` has the intrinsics, and the start pose if `started`.
+impl<S: Softness> Search<'_, S> {
+    /// The poses that fit the target, best first; from the pose of the camera only, if `started`.
     pub(super) fn found<B: RasterBackend>(
         &self,
-        mesh: &Mesh,
-        target: &Target<'_>,
-        camera: &Pinhole,
         started: bool,
-        method: &Method<impl Softness>,
         visit: &mut impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
-        check(mesh, target.mask, camera, started)?;
-        let frame = Frame::of_mesh(mesh);
-        let (mesh, camera) = (&frame.mesh(mesh), frame.camera(camera));
+        let target = self.target;
+        check(self.mesh, target.mask, &self.camera, started)?;
+        let frame = Frame::of_mesh(self.mesh);
+        let mesh = &frame.mesh(self.mesh);
+        let free = Search { mesh, camera: frame.camera(&self.camera), ..*self };
+        let settings = Settings { optimise_fov: false, ..self.settings };
+        let fixed = Search { settings, ..free };
         let visit =
             &mut |step, loss, pose: &Pinhole| visit(step, loss, &frame.camera_to_world(pose));
-        let fixed = Self { optimise_fov: false, ..*self };
         let starts = match started {
-            true => vec![camera],
-            false => fixed.promising_starts::<B>(mesh, target, &camera, method, visit)?,
+            true => vec![fixed.camera],
+            false => fixed.promising_starts::<B>(visit)?,
         };
         let Stages { coarse: (_, coarse_steps), last, .. } = Stages::of(target.cut);
         let mut begun = if started { 0 } else { STARTS.1 + coarse_steps };
-        let (poses, fine) = (target.poses(starts, true), self.fine());
-        let mut found = fixed.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
+        let (poses, fine) = (target.poses(starts, true), free.fine());
+        let mut found = fixed.improved::<B>(poses, &fine, begun, visit)?;
         if last > 0 {
-            begun += self.fine_steps;
+            begun += fine.steps;
             found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
             let best = found.drain(..last.min(found.len())).map(|(camera, _)| camera);
             let poses = target.poses(best.collect::<Vec<_>>(), true);
-            let better = fixed.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
+            let better = fixed.improved::<B>(poses, &fine, begun, visit)?;
             found.extend(better);
         }
         found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
         if target.painted.is_none() {
-            begun += self.fine_steps;
+            begun += fine.steps;
             let (best, loss) = *found.first().context("no pose was tried")?;
             let visit = |share: f64| {
                 visit(begun + (share * SHARPENING_STEPS as f64).ceil() as usize, loss, &best)
             };
-            found = self.sharpened(mesh, target, &found, visit)?;
-        } else if self.optimise_fov {
-            begun += self.fine_steps;
+            found = free.sharpened(&found, visit)?;
+        } else if self.settings.optimise_fov {
+            begun += fine.steps;
             let best = found.iter().take(SHARPENED).flat_map(|(camera, _)| zoomed(camera));
             let poses = target.poses(best.collect::<Vec<_>>(), true);
-            found.extend(self.improved::<B>(mesh, poses, method, &fine, begun, visit)?);
+            found.extend(free.improved::<B>(poses, &fine, begun, visit)?);
         }
         let scored = found.into_iter().map(|(camera, loss)| {
             let iou = mask_iou(&silhouette_pixels(mesh, &camera), target.mask);
@@ -184,33 +202,27 @@ impl Search {
     /// The poses that a search without a start improves at high resolution, the most promising first.
     pub(super) fn starts<B: RasterBackend>(
         &self,
-        mesh: &Mesh,
-        mask: &Picture,
-        camera: &Pinhole,
-        method: &Method<impl Softness>,
         visit: &mut impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
-        check(mesh, mask, camera, false)?;
-        let frame = Frame::of_mesh(mesh);
-        let (mesh, camera, target) =
-            (frame.mesh(mesh), frame.camera(camera), Target::new(mask, None)?);
+        check(self.mesh, self.target.mask, &self.camera, false)?;
+        let frame = Frame::of_mesh(self.mesh);
+        let mesh = &frame.mesh(self.mesh);
+        let search = Search { mesh, camera: frame.camera(&self.camera), ..*self };
         let visit =
             &mut |step, loss, pose: &Pinhole| visit(step, loss, &frame.camera_to_world(pose));
-        let starts = self.promising_starts::<B>(&mesh, &target, &camera, method, visit)?;
+        let starts = search.promising_starts::<B>(visit)?;
         Ok(starts.iter().map(|camera| frame.camera_to_world(camera)).collect())
     }
 
     fn promising_starts<B: RasterBackend>(
         &self,
-        mesh: &Mesh,
-        target: &Target<'_>,
-        camera: &Pinhole,
-        method: &Method<impl Softness>,
         visit: &mut impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
-        let few = coarse(mesh);
+        let (target, learning_rate) = (self.target, self.settings.learning_rate);
+        let few = coarse(self.mesh);
+        let low = Search { mesh: &few, ..*self };
         let alike = target.painted.is_none().then_some(&*few);
-        let mut found = apart(glance(&few, target, camera), STARTS.0, APART_DEG, None);
+        let mut found = apart(glance(&few, target, &self.camera), STARTS.0, APART_DEG, None);
         ensure!(
             !found.is_empty(),
             "no pose can be searched for in a mask that is so narrow: give a pose to start from (--start)"
@@ -221,9 +233,9 @@ impl Search {
         for ((_, steps), left) in [(STARTS, coarse.0), (coarse, fine)] {
             // Silhouettes approach a pose faster than colours do; colours then rank the results.
             let poses = target.poses(found.into_iter().map(|(start, _)| start), false);
-            let stage = SolveConfig { steps, size: COARSE_SIZE, learning_rate: self.learning_rate };
-            let better = self.improved::<B>(&few, poses, method, &stage, begun, visit)?;
-            found = apart(self.judged(&few, target, better), left, APART_DEG, alike);
+            let stage = SolveConfig { steps, size: COARSE_SIZE, learning_rate };
+            let better = low.improved::<B>(poses, &stage, begun, visit)?;
+            found = apart(low.judged(better), left, APART_DEG, alike);
             begun += steps;
         }
         let least = found.first().map_or(0.0, |&(_, loss)| loss);
@@ -235,21 +247,20 @@ impl Search {
     /// optimised, with a free one. `visit` receives the share that is done.
     fn sharpened(
         &self,
-        mesh: &Mesh,
-        target: &Target<'_>,
         found: &[(Pinhole, f64)],
         mut visit: impl FnMut(f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<(Pinhole, f64)>> {
+        let Settings { fine_size, optimise_fov, .. } = self.settings;
         let (best, others) = found.split_at(SHARPENED.min(found.len()));
         let best: Vec<Pinhole> = best.iter().map(|(camera, _)| *camera).collect();
         let zoomed = best.first().into_iter().flat_map(zoomed).chain(best.iter().skip(1).copied());
-        let zoomed: Vec<Pinhole> = zoomed.filter(|_| self.optimise_fov).collect();
+        let zoomed: Vec<Pinhole> = zoomed.filter(|_| optimise_fov).collect();
         let count = (best.len() + zoomed.len()) as f64;
         let mut done = 0.0;
         let mut sharp = |starts: Vec<Pinhole>, optimise_fov: bool| {
-            let poses = target.poses(starts, false).into_iter().map(|pose| {
+            let poses = self.target.poses(starts, false).into_iter().map(|pose| {
                 let visit = |share: f64| visit((done + share) / count);
-                let sharp = least_squares(mesh, &pose, optimise_fov, self.fine_size, visit)?;
+                let sharp = least_squares(self.mesh, &pose, optimise_fov, fine_size, visit)?;
                 done += 1.0;
                 anyhow::Ok(sharp)
             });
@@ -262,48 +273,42 @@ impl Search {
     }
 
     /// Poses with the low-resolution error of their hard image: by colour, if the target has colours; else as given.
-    fn judged(
-        &self,
-        mesh: &Mesh,
-        target: &Target<'_>,
-        poses: Vec<(Pinhole, f64)>,
-    ) -> Vec<(Pinhole, f64)> {
-        if target.painted.is_none() {
+    fn judged(&self, poses: Vec<(Pinhole, f64)>) -> Vec<(Pinhole, f64)> {
+        if self.target.painted.is_none() {
             return poses;
         }
-        let instances = target.poses(poses.iter().map(|&(camera, _)| camera), true);
-        let problem = self.problem(mesh, &instances);
+        let instances = self.target.poses(poses.iter().map(|&(camera, _)| camera), true);
+        let problem = self.problem(&instances);
         let scene = problem.scene::<HostBackend>(&instances, COARSE_SIZE);
         let image = problem.hard_image(&scene, problem.start(&scene));
         let losses = numbers(problem.image_loss(&scene, image));
         poses.into_iter().zip(losses).map(|((camera, _), loss)| (camera, loss)).collect()
     }
 
-    fn problem(&self, mesh: &Mesh, poses: &[MaskPose]) -> MaskPoses {
-        let mut problem = MaskPoses::new(mesh, poses.to_vec());
-        problem.optimise_fov = self.optimise_fov;
+    fn problem(&self, poses: &[MaskPose]) -> MaskPoses {
+        let mut problem = MaskPoses::new(self.mesh, poses.to_vec());
+        problem.optimise_fov = self.settings.optimise_fov;
         problem
     }
 
     /// Settings of the high-resolution stage.
     fn fine(&self) -> SolveConfig {
-        let learning_rate = self.learning_rate / 3.0;
-        SolveConfig { size: self.fine_size, steps: self.fine_steps, learning_rate }
+        let Settings { fine_size, learning_rate, .. } = self.settings;
+        let steps = self.settings.fine_steps(self.target.painted.is_some());
+        SolveConfig { size: fine_size, steps, learning_rate: learning_rate / 3.0 }
     }
 
     /// Poses that are improved together: the iterate of each with the smallest error of the hard image, and that error.
     fn improved<B: RasterBackend>(
         &self,
-        mesh: &Mesh,
         poses: Vec<MaskPose>,
-        method: &Method<impl Softness>,
         stage: &SolveConfig,
         begun: usize,
         visit: &mut impl FnMut(usize, f64, &Pinhole) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<(Pinhole, f64)>> {
-        let problem = self.problem(mesh, &poses);
+        let problem = self.problem(&poses);
         let mut best = vec![None; poses.len()];
-        minimize::<_, B>(&problem, &poses, method, stage, |iterate: &Iterate, scene| {
+        minimize::<_, B>(&problem, &poses, self.method, stage, |iterate: &Iterate, scene| {
             let now = scene.found(iterate.theta.clone(), &poses);
             for ((best, camera), &loss) in best.iter_mut().zip(now).zip(&iterate.hard_loss) {
                 if best.is_none_or(|(_, least)| loss < least) {
