@@ -21,6 +21,7 @@ pub fn cross<T: Copy + Sub<Output = T> + Mul<Output = T>>(a: [T; 3], b: [T; 3]) 
 }
 
 /// `√(a · a)`.
+#[inline]
 pub fn norm(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }

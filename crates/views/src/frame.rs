@@ -1,4 +1,7 @@
-use softrast_mesh::Mesh;
+use softrast_mesh::{
+    Mesh,
+    vectors::{difference, norm},
+};
 use softrast_raster::Pinhole;
 
 /// Least unit of a frame derived from depths, relative to the largest depth: the near plane is at a hundredth of that unit.
@@ -110,7 +113,7 @@ impl Frame {
 pub fn bounding_ball(mesh: &Mesh) -> ([f64; 3], f64) {
     let [low, high] = mesh.bounds();
     let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
-    let distance = |p: [f64; 3]| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f64>().sqrt();
+    let distance = |p: [f64; 3]| norm(difference(p, middle));
     (middle, mesh.triangles().flatten().map(distance).fold(0.0, f64::max))
 }
 

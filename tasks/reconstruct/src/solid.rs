@@ -1,6 +1,6 @@
 //! Solids made of a few simple parts, for the shapes of the procedural set.
 
-use softrast_mesh::vectors::{dot, norm};
+use softrast_mesh::vectors::{difference, dot, norm};
 
 /// A simple solid, in world units.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +30,7 @@ impl Part {
             Self::Block { centre, half, .. } => (*centre, norm(*half)),
             Self::Stroke { from, to, radii, .. } => {
                 let middle = [0, 1, 2].map(|k| f64::midpoint(from[k], to[k]));
-                let half = norm([0, 1, 2].map(|k| to[k] - middle[k]));
+                let half = norm(difference(*to, middle));
                 (middle, half + radii[0].max(radii[1]))
             }
             Self::Cone { centre: [x, z], low, high, radii } => {
@@ -52,8 +52,8 @@ impl Part {
                 // at least those here, and at most the largest factor times them.
                 let p = [0, 1, 2].map(|k| p[k] * thinned[k]);
                 let [from, to] = [from, to].map(|end| [0, 1, 2].map(|k| end[k] * thinned[k]));
-                let along = [0, 1, 2].map(|k| to[k] - from[k]);
-                let offset = [0, 1, 2].map(|k| p[k] - from[k]);
+                let along = difference(to, from);
+                let offset = difference(p, from);
                 let t = (dot(offset, along) / dot(along, along)).clamp(0.0, 1.0);
                 let away = norm([0, 1, 2].map(|k| offset[k] - t * along[k]));
                 let factor = thinned.iter().copied().fold(1.0, f64::max);

@@ -1,7 +1,7 @@
 //! Pictures of solids by ray casting, without the rasterizer: training data must not depend on the
 //! renderer in training.
 
-use softrast_mesh::vectors::{dot, norm};
+use softrast_mesh::vectors::{difference, dot, norm};
 
 use crate::solid::{Part, Solid};
 
@@ -80,7 +80,7 @@ pub(crate) fn picture(solid: &Solid, view: usize) -> Vec<u8> {
 
 /// Entry and exit of a ray through a ball, as distances from the eye.
 fn passage(eye: [f64; 3], ray: [f64; 3], (centre, radius): &([f64; 3], f64)) -> Option<(f64, f64)> {
-    let offset = [0, 1, 2].map(|k| centre[k] - eye[k]);
+    let offset = difference(*centre, eye);
     let along = dot(offset, ray);
     let square = radius * radius - (dot(offset, offset) - along * along);
     (square > 0.0).then(|| (along - square.sqrt(), along + square.sqrt()))

@@ -1,5 +1,6 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use softrast_kernel::Nearest;
+use softrast_mesh::vectors::{cross, difference, norm};
 
 /// Points per surface.
 const POINTS: usize = 10_000;
@@ -68,9 +69,7 @@ fn spread(positions: &[[f64; 3]], faces: &[[u32; 3]], seed: u64) -> Vec<[f64; 3]
 }
 
 fn area([a, b, c]: [[f64; 3]; 3]) -> f64 {
-    let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
-    let cross = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| u[i] * v[j] - u[j] * v[i]);
-    0.5 * cross.iter().map(|x| x * x).sum::<f64>().sqrt()
+    0.5 * norm(cross(difference(b, a), difference(c, a)))
 }
 
 #[cfg(test)]

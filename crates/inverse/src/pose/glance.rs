@@ -1,6 +1,9 @@
 use std::borrow::Cow;
 
-use softrast_mesh::{Mesh, vectors::product};
+use softrast_mesh::{
+    Mesh,
+    vectors::{cross, product},
+};
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, Projected, hard_silhouette, iou_loss, project, vertex_tensor,
 };
@@ -232,7 +235,7 @@ fn directions() -> impl Iterator<Item = [[f64; 3]; 3]> {
         // An orbiting camera, then rolled. No direction is a pole.
         let ahead = [around * cos, y, around * sin];
         let right = [-ahead[2] / around, 0.0, ahead[0] / around];
-        let down = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| ahead[i] * right[j] - ahead[j] * right[i]);
+        let down = cross(ahead, right);
         let (sin, cos) = (std::f64::consts::TAU * roll as f64 / ROLLS as f64).sin_cos();
         [
             [0, 1, 2].map(|k| cos * right[k] + sin * down[k]),

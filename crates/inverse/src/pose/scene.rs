@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use softrast_mesh::Mesh;
+use softrast_mesh::{Mesh, vectors::norm};
 use softrast_raster::{
     HostBackend, Orbit, Projected, RasterBackend, hard_silhouette, project, vertex_tensor,
     view_rotation,
@@ -156,6 +156,5 @@ fn seen_by<B: RasterBackend>(mesh: &Mesh, cameras: &[Orbit], size: usize) -> [Te
 
 /// Distance from the origin beyond which the whole mesh is in front of a camera.
 pub fn nearest_distance(mesh: &Mesh) -> f64 {
-    let radius = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
-    CLEARANCE * mesh.triangles().flatten().map(radius).fold(0.0, f64::max)
+    CLEARANCE * mesh.triangles().flatten().map(norm).fold(0.0, f64::max)
 }

@@ -1,6 +1,6 @@
 use softrast_mesh::{
     Mesh,
-    vectors::{cross, dot, norm, product},
+    vectors::{cross, difference, dot, norm, product},
 };
 use softrast_views::bounding_ball;
 
@@ -40,8 +40,8 @@ pub fn symmetries(mesh: &Mesh) -> Vec<Symmetry> {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut axes = identity.to_vec();
     let (middle, of_inertia) = inertia(mesh);
-    let away = |p: &[f64; 3]| [0, 1, 2].map(|k| p[k] - middle[k]);
-    let radius = mesh.positions().iter().map(|p| norm(away(p))).fold(0.0, f64::max);
+    let away = |&p: &[f64; 3]| norm(difference(p, middle));
+    let radius = mesh.positions().iter().map(away).fold(0.0, f64::max);
     for axis in of_inertia {
         if axes.iter().all(|known| dot(*known, axis).abs() < SAME_AXIS) {
             axes.push(axis);
@@ -101,8 +101,7 @@ fn inertia(mesh: &Mesh) -> ([f64; 3], Vec<[f64; 3]>) {
     // The centroid of each face, weighted by area.
     let middles = mesh.faces().iter().map(|face| {
         let [a, b, c] = face.map(|vertex| place(positions[vertex as usize]));
-        let side = |to: [f64; 3]| [0, 1, 2].map(|k| to[k] - a[k]);
-        let normal = cross(side(b), side(c));
+        let normal = cross(difference(b, a), difference(c, a));
         (norm(normal), [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0))
     });
     let middles: Vec<(f64, [f64; 3])> = middles.collect();

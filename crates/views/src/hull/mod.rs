@@ -4,7 +4,10 @@
 
 use anyhow::{Context, ensure};
 use rayon::prelude::*;
-use softrast_mesh::Mesh;
+use softrast_mesh::{
+    Mesh,
+    vectors::{difference, norm},
+};
 use softrast_raster::Pinhole;
 
 use self::cone::Cone;
@@ -195,7 +198,7 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
     let whole = cones.iter().filter(|cone| !cone.cut).count();
     for cone in cones.iter().filter(|cone| !cone.cut || 2 * whole < cones.len()) {
         let eye = eye(&cone.view.camera)?;
-        let (eye, ray) = ([0, 1, 2].map(|k| eye[k] - origin[k]), cone.ray());
+        let (eye, ray) = (difference(eye, origin), cone.ray());
         for i in 0..3 {
             for j in 0..3 {
                 let across = f64::from(u8::from(i == j)) - ray[i] * ray[j];
@@ -216,10 +219,8 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
     };
     let reach = cones.iter().map(reach_of).fold(0.0, f64::max);
     for view in cones.iter().map(|cone| cone.view) {
-        let seen = view.camera.transform(middle);
-        let away = (0..3).map(|k| seen[k].powi(2)).sum::<f64>().sqrt();
         ensure!(
-            away > 0.5 * reach,
+            norm(view.camera.transform(middle)) > 0.5 * reach,
             "{}: the camera is inside the object that the other masks show: check its transform_matrix",
             view.name
         );

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 use softrast_inverse::pose::FoundPose;
 use softrast_lab::{format::short, report::Table};
+use softrast_mesh::vectors::norm;
 use softrast_raster::Pinhole;
 use softrast_views::{Frame, camera_json};
 
@@ -40,7 +41,7 @@ pub(super) fn of_camera(pose: &FoundPose, frame: &Frame) -> Table {
     }
     pairs.push(["t".to_owned(), row(&camera.translation)]);
     pairs.push(["Camera stands at".to_owned(), row(&camera.eye())]);
-    let distance = camera.transform(frame.middle).iter().map(|x| x * x).sum::<f64>().sqrt();
+    let distance = norm(camera.transform(frame.middle));
     pairs.push(["Distance to the middle of the mesh".to_owned(), short(distance)]);
     pairs.push([
         "fx, fy, cx, cy in pixels".to_owned(),
