@@ -4,7 +4,7 @@ use crate::{
     Fault, MeshError, Texture,
     error::shown,
     subdivision::{between, quartered},
-    vectors::{cross, difference, norm},
+    vectors::{norm, normal},
 };
 
 /// Vertices and the triangles between them.
@@ -155,9 +155,7 @@ impl Mesh {
 
     /// Surface area in square world units: the sum over the triangles, regardless of orientation.
     pub fn area(&self) -> f64 {
-        self.triangles()
-            .map(|[a, b, c]| 0.5 * norm(cross(difference(b, a), difference(c, a))))
-            .sum()
+        self.triangles().map(|triangle| 0.5 * norm(normal(triangle))).sum()
     }
 
     /// A mesh of valid parts.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::{
     Mesh,
-    vectors::{cross, difference, norm},
+    vectors::{difference, norm, normal},
 };
 
 /// Most rounds of moves.
@@ -124,11 +124,11 @@ fn counts(mesh: &Mesh, pairs: &[[u32; 2]], labels: &[Option<usize>]) -> BTreeMap
 fn moved(mesh: &Mesh, neighbours: &[Vec<u32>], how: impl Fn(usize) -> Option<Move>) -> Mesh {
     let before = mesh.positions();
     let mut normals: BTreeMap<usize, [f64; 3]> = BTreeMap::new();
-    for (face, [a, b, c]) in mesh.faces().iter().zip(mesh.triangles()) {
+    for (face, triangle) in mesh.faces().iter().zip(mesh.triangles()) {
         for v in
             face.iter().map(|&v| v as usize).filter(|&v| matches!(how(v), Some(Move::Along(_))))
         {
-            let n = cross(difference(b, a), difference(c, a));
+            let n = normal(triangle);
             let sum = normals.entry(v).or_default();
             (0..3).for_each(|k| sum[k] += n[k]);
         }

@@ -20,6 +20,12 @@ pub fn cross<T: Copy + Sub<Output = T> + Mul<Output = T>>(a: [T; 3], b: [T; 3]) 
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// Twice the area of a triangle, along its normal.
+#[inline(always)]
+pub fn normal<T: Copy + Sub<Output = T> + Mul<Output = T>>([a, b, c]: [[T; 3]; 3]) -> [T; 3] {
+    cross(difference(b, a), difference(c, a))
+}
+
 /// `√(a · a)`.
 #[inline]
 pub fn norm(a: [f64; 3]) -> f64 {

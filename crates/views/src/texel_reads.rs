@@ -4,7 +4,7 @@ use anyhow::ensure;
 use rayon::prelude::*;
 use softrast_mesh::{
     Mesh,
-    vectors::{cross, difference, dot},
+    vectors::{dot, normal},
 };
 use softrast_raster::Pinhole;
 
@@ -237,7 +237,7 @@ impl Sample {
 fn cosines(mesh: &Mesh, camera: &Pinhole) -> Vec<f32> {
     let eye = camera.eye();
     let of = |[a, b, c]: [[f64; 3]; 3]| {
-        let n = cross(difference(b, a), difference(c, a));
+        let n = normal([a, b, c]);
         let to = [0, 1, 2].map(|k| eye[k] - (a[k] + b[k] + c[k]) / 3.0);
         let lengths = (dot(n, n) * dot(to, to)).sqrt();
         if lengths > 0.0 { (dot(n, to) / lengths).max(0.0) as f32 } else { 0.0 }

@@ -2,7 +2,7 @@
 
 use image::{Rgb, RgbImage, imageops};
 use softrast_lab::contact_sheet;
-use softrast_mesh::vectors::{cross, difference, dot, norm};
+use softrast_mesh::vectors::{dot, norm, normal};
 use softrast_tensor::Backend;
 
 use crate::{Network, SIZE, Shapes, Template, VIEWS, score, view};
@@ -79,8 +79,7 @@ pub(crate) fn drawn(vertices: &[[f64; 3]], faces: &[[u32; 3]], view: usize) -> R
         .collect();
     for face in faces {
         let [a, b, c] = face.map(|v| seen[v as usize]);
-        let [p, q, r] = face.map(|v| vertices[v as usize]);
-        let normal = cross(difference(q, p), difference(r, p));
+        let normal = normal(face.map(|v| vertices[v as usize]));
         // Surfaces that are turned inside out are lit as if they were not.
         let side = if dot(normal, axes[2]) > 0.0 { -1.0 } else { 1.0 };
         let length = norm(normal).max(1e-12) * side;

@@ -1,6 +1,6 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use softrast_kernel::Nearest;
-use softrast_mesh::vectors::{cross, difference, norm};
+use softrast_mesh::vectors::{norm, normal};
 
 /// Points per surface.
 const POINTS: usize = 10_000;
@@ -48,7 +48,7 @@ impl Chamfer {
 /// Points on a surface, evenly by area.
 fn spread(positions: &[[f64; 3]], faces: &[[u32; 3]], seed: u64) -> Vec<[f64; 3]> {
     let corners = |face: usize| faces[face].map(|v| positions[v as usize]);
-    let areas: Vec<f64> = (0..faces.len()).map(|face| area(corners(face))).collect();
+    let areas: Vec<f64> = (0..faces.len()).map(|face| 0.5 * norm(normal(corners(face)))).collect();
     let total: f64 = areas.iter().sum();
     let mut random = StdRng::seed_from_u64(seed);
     let (mut face, mut passed) = (0, areas[0]);
@@ -66,10 +66,6 @@ fn spread(positions: &[[f64; 3]], faces: &[[u32; 3]], seed: u64) -> Vec<[f64; 3]
             [0, 1, 2].map(|axis| (0..3).map(|k| weights[k] * corners[k][axis]).sum())
         })
         .collect()
-}
-
-fn area([a, b, c]: [[f64; 3]; 3]) -> f64 {
-    0.5 * norm(cross(difference(b, a), difference(c, a)))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 use softrast_mesh::{
     Mesh,
-    vectors::{cross, difference, dot, norm, product},
+    vectors::{cross, difference, dot, norm, normal, product},
 };
 use softrast_views::bounding_ball;
 
@@ -101,8 +101,7 @@ fn inertia(mesh: &Mesh) -> ([f64; 3], Vec<[f64; 3]>) {
     // The centroid of each face, weighted by area.
     let middles = mesh.faces().iter().map(|face| {
         let [a, b, c] = face.map(|vertex| place(positions[vertex as usize]));
-        let normal = cross(difference(b, a), difference(c, a));
-        (norm(normal), [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0))
+        (norm(normal([a, b, c])), [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0))
     });
     let middles: Vec<(f64, [f64; 3])> = middles.collect();
     let area: f64 = middles.iter().map(|(area, _)| area).sum();

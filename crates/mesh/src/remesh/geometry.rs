@@ -1,7 +1,6 @@
 use rayon::prelude::*;
 
-use super::normal;
-use crate::vectors::{cross, difference, dot};
+use crate::vectors::{cross, difference, dot, normal};
 
 /// Least length by which normals are divided; those of vertices whose faces have no area are shorter.
 const LEAST: f32 = 1e-30;

@@ -14,7 +14,7 @@ use half_edges::HalfEdges;
 
 use crate::{
     Mesh, MeshError,
-    vectors::{cross, difference, dot},
+    vectors::{difference, dot, normal},
 };
 
 /// Edges shorter than this fraction of their target length collapse.
@@ -204,12 +204,6 @@ fn lengths(numbers: &[f32], width: usize, [a, b]: [u32; 2]) -> [f32; 2] {
     let target = |v: u32| numbers[v as usize * width + ClosedSurface::LENGTH];
     let along = difference(place(numbers, width, b), place(numbers, width, a));
     [0.5 * (target(a) + target(b)), dot(along, along).sqrt()]
-}
-
-/// Twice the area of a triangle, along its normal.
-#[inline(always)]
-fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
-    cross(difference(b, a), difference(c, a))
 }
 
 /// Quality of a triangle: twice its area over the sum of its squared sides, 0 for a line, 0.29 if equilateral.

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet, VecDeque};
 
 use softrast_mesh::{
     Mesh,
-    vectors::{cross, difference, norm},
+    vectors::{norm, normal},
 };
 
 /// Rounds in which normals are averaged with those of neighbours before an axis is chosen, so that roughness does not break charts.
@@ -25,7 +25,7 @@ pub(super) struct Chart {
 /// The charts of a mesh. Every face is in one, and no two faces of a chart cover the middle of the same square of `unit` × `unit`, in world units.
 pub(super) fn charts(mesh: &Mesh, unit: f64) -> Vec<Chart> {
     let triangles: Vec<[[f64; 3]; 3]> = mesh.triangles().collect();
-    let normals: Vec<[f64; 3]> = triangles.iter().map(normal).collect();
+    let normals: Vec<[f64; 3]> = triangles.iter().copied().map(normal).collect();
     let beside = neighbours(mesh.faces());
     let mut axes = axes(&normals, &beside);
     let all: f64 = normals.iter().copied().map(norm).sum();
@@ -44,11 +44,6 @@ pub(super) fn charts(mesh: &Mesh, unit: f64) -> Vec<Chart> {
         }
     }
     charts
-}
-
-/// Twice the area of a triangle, along its normal.
-fn normal(&[a, b, c]: &[[f64; 3]; 3]) -> [f64; 3] {
-    cross(difference(b, a), difference(c, a))
 }
 
 /// The faces beyond the edges of each face, where no more than two share one.
