@@ -100,13 +100,7 @@ impl PictureFile {
 
     /// The class of a pixel: its index in the palette, or without a palette its level as an integer.
     pub(crate) fn class_of(&self, [red, green, blue, _]: Pixel) -> Option<u32> {
-        let most = match &self.image {
-            DynamicImage::ImageLuma16(_)
-            | DynamicImage::ImageLumaA16(_)
-            | DynamicImage::ImageRgb16(_)
-            | DynamicImage::ImageRgba16(_) => f32::from(u16::MAX),
-            _ => f32::from(u8::MAX),
-        };
+        let most = if self.has_16_bits() { f32::from(u16::MAX) } else { f32::from(u8::MAX) };
         let colour = [red, green, blue].map(|x| (x * most).round() as u32);
         match &self.palette {
             Some(palette) => {
@@ -152,35 +146,26 @@ impl PictureFile {
         [self.image.height() as usize, self.image.width() as usize].into()
     }
 
+    /// Whether samples have 16 bits, and not 8: decoders of PNG, JPEG and GIF produce no others.
+    fn has_16_bits(&self) -> bool {
+        let colour = self.image.color();
+        colour.bytes_per_pixel() == 2 * colour.channel_count()
+    }
+
     /// Fills `row` with the pixels of a row of the file.
     fn row(&self, y: usize, row: &mut Vec<Pixel>) {
-        let width = self.image.width() as usize;
+        let channels = usize::from(self.image.color().channel_count());
+        let samples = self.image.width() as usize * channels;
+        let bytes = self.image.as_bytes();
         row.clear();
-        match &self.image {
-            DynamicImage::ImageLuma16(_)
-            | DynamicImage::ImageLumaA16(_)
-            | DynamicImage::ImageRgb16(_)
-            | DynamicImage::ImageRgba16(_) => {
-                let channels = usize::from(self.image.color().channel_count());
-                let samples: &[u16] = match &self.image {
-                    DynamicImage::ImageLuma16(image) => image.as_raw(),
-                    DynamicImage::ImageLumaA16(image) => image.as_raw(),
-                    DynamicImage::ImageRgb16(image) => image.as_raw(),
-                    DynamicImage::ImageRgba16(image) => image.as_raw(),
-                    _ => &[],
-                };
-                let samples = &samples[y * width * channels..(y + 1) * width * channels];
-                let level = |sample: u16| f32::from(sample) / f32::from(u16::MAX);
-                row.extend(samples.chunks_exact(channels).map(|pixel| rgba(pixel, level)));
-            }
-            image => {
-                // Decoders of PNG, JPEG and GIF produce only integers of 8 or 16 bits.
-                let channels = usize::from(image.color().channel_count());
-                let samples = image.as_bytes();
-                let samples = &samples[y * width * channels..(y + 1) * width * channels];
-                let level = |sample: u8| f32::from(sample) / f32::from(u8::MAX);
-                row.extend(samples.chunks_exact(channels).map(|pixel| rgba(pixel, level)));
-            }
+        if self.has_16_bits() {
+            let line = &bytes.as_chunks().0[y * samples..(y + 1) * samples];
+            let level = |sample| f32::from(u16::from_ne_bytes(sample)) / f32::from(u16::MAX);
+            row.extend(line.chunks_exact(channels).map(|pixel| rgba(pixel, level)));
+        } else {
+            let line = &bytes[y * samples..(y + 1) * samples];
+            let level = |sample| f32::from(sample) / f32::from(u8::MAX);
+            row.extend(line.chunks_exact(channels).map(|pixel| rgba(pixel, level)));
         }
     }
 }
