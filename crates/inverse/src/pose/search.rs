@@ -148,8 +148,7 @@ impl<S: Softness> Search<'_, S> {
         let frame = Frame::of_mesh(self.mesh);
         let mesh = &frame.mesh(self.mesh);
         let free = Search { mesh, camera: frame.camera(&self.camera), ..*self };
-        let settings = Settings { optimise_fov: false, ..self.settings };
-        let fixed = Search { settings, ..free };
+        let fixed = Search { settings: Settings { optimise_fov: false, ..self.settings }, ..free };
         let visit =
             &mut |step, loss, pose: &Pinhole| visit(step, loss, &frame.camera_to_world(pose));
         let starts = match started {
@@ -164,8 +163,7 @@ impl<S: Softness> Search<'_, S> {
             begun += fine.steps;
             found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
             let best = found.drain(..last.min(found.len())).map(|(camera, _)| camera);
-            let poses = target.poses(best.collect::<Vec<_>>(), true);
-            let better = fixed.improved::<B>(poses, &fine, begun, visit)?;
+            let better = fixed.improved::<B>(target.poses(best, true), &fine, begun, visit)?;
             found.extend(better);
         }
         found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
@@ -179,8 +177,8 @@ impl<S: Softness> Search<'_, S> {
         } else if self.settings.optimise_fov {
             begun += fine.steps;
             let best = found.iter().take(SHARPENED).flat_map(|(camera, _)| zoomed(camera));
-            let poses = target.poses(best.collect::<Vec<_>>(), true);
-            found.extend(free.improved::<B>(poses, &fine, begun, visit)?);
+            let better = free.improved::<B>(target.poses(best, true), &fine, begun, visit)?;
+            found.extend(better);
         }
         let scored = found.into_iter().map(|(camera, loss)| {
             let iou = mask_iou(&silhouette_pixels(mesh, &camera), target.mask);
