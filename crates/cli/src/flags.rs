@@ -31,7 +31,7 @@ pub struct Common {
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub steps: Option<usize>,
 
-    /// Shorter side of the image, in pixels; images are square, except those of pictures that are not (shape2d)
+    /// Shorter side of the image, in pixels; images are square, except for shape2d --target
     #[arg(long, value_name = "N", value_parser = whole::<1, 4096>, allow_negative_numbers = true)]
     pub size: Option<usize>,
 

@@ -21,9 +21,9 @@ pub type HostBackend = softrast_tensor::Flex;
 /// use softrast_raster::{BackendChoice, NoAdapter, NoBackend};
 ///
 /// let compiled = &[BackendChoice::NdArray];
-/// let choice = BackendChoice::among(compiled, None)?;
+/// let choice = BackendChoice::select(compiled, None)?;
 /// assert_eq!((choice.name(), choice.title()), ("ndarray", "ndarray f32"));
-/// let missing = BackendChoice::among(compiled, Some("flex"));
+/// let missing = BackendChoice::select(compiled, Some("flex"));
 /// assert!(matches!(missing, Err(NoBackend::Missing { asked: BackendChoice::Flex, .. })));
 /// // Fails where wgpu finds no adapter.
 /// let up: Result<(), NoAdapter> = choice.set_up();
@@ -75,7 +75,7 @@ impl BackendChoice {
     /// # Panics
     ///
     /// If nothing was compiled in.
-    pub fn among(compiled: &'static [Self], asked: Option<&str>) -> Result<Self, NoBackend> {
+    pub fn select(compiled: &'static [Self], asked: Option<&str>) -> Result<Self, NoBackend> {
         let Some(asked) = asked else {
             return Ok(*compiled.first().expect("a program has a backend"));
         };
@@ -199,18 +199,18 @@ mod tests {
 
     #[test]
     fn the_first_is_chosen_unless_another_is_asked_for() {
-        assert_eq!(BackendChoice::among(&[Flex, Wgpu], None), Ok(Flex));
-        assert_eq!(BackendChoice::among(&[Flex, Wgpu], Some("wgpu")), Ok(Wgpu));
+        assert_eq!(BackendChoice::select(&[Flex, Wgpu], None), Ok(Flex));
+        assert_eq!(BackendChoice::select(&[Flex, Wgpu], Some("wgpu")), Ok(Wgpu));
     }
 
     #[test]
     fn what_is_not_there_is_refused_in_a_line_that_helps() {
-        let missing = BackendChoice::among(&[NdArray, Flex], Some("wgpu")).unwrap_err();
+        let missing = BackendChoice::select(&[NdArray, Flex], Some("wgpu")).unwrap_err();
         assert_eq!(
             missing.to_string(),
             "this program was built without wgpu, for ndarray and flex: build it with the feature wgpu"
         );
-        let unknown = BackendChoice::among(&[NdArray], Some("opencl")).unwrap_err();
+        let unknown = BackendChoice::select(&[NdArray], Some("opencl")).unwrap_err();
         assert!(unknown.to_string().contains("flex"), "{unknown}");
     }
 }

@@ -19,7 +19,7 @@
 //! assert!(alpha[4] > 0.99 && alpha[0] < 0.01);
 //! ```
 //!
-//! # Example: a sharp image with a wide gradient
+//! # Example: a sharp image with the gradient of a wider softness
 //!
 //! ```
 //! use softrast_raster::{HostBackend, Projected, SoftRenderer, vertex_tensor};

@@ -242,9 +242,9 @@ impl<S: Softness> Silhouette<S> {
     /// Coverage with a surrogate gradient: the image is that of `self`, the gradient with respect to the vertices is that of `surrogate`
     /// times the image's own `dA/dS`.
     ///
-    /// This is a straight-through estimator: a sharp image with a wide gradient. The result of the backward pass is **not** the derivative
-    /// of the image. Gradients reach the parameters of neither softness at the outermost level of autodiff. A step takes as many passes as
-    /// without.
+    /// This is a straight-through estimator: a sharp image with the gradient of a wider softness. The result of the backward pass is **not**
+    /// the derivative of the image. Gradients reach the parameters of neither softness at the outermost level of autodiff. A step takes as
+    /// many passes as without.
     ///
     /// Not in the paper. Source: docs/notes.md, Surrogate gradient.
     pub fn coverage_with_surrogate<B: RasterBackend, T: Softness>(

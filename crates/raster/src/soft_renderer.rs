@@ -159,8 +159,8 @@ impl<S: Softness> SoftRenderer<S> {
         self
     }
 
-    /// Sets a surrogate softness for the backward pass, of this [`Width`]: a sharp image with a wide gradient. The gradient is not the
-    /// derivative of the image; see [`Silhouette::coverage_with_surrogate`].
+    /// Sets a surrogate softness for the backward pass, of this [`Width`]: a sharp image with the gradient of a wider softness. The
+    /// gradient is not the derivative of the image; see [`Silhouette::coverage_with_surrogate`].
     ///
     /// # Panics
     ///

@@ -61,7 +61,7 @@ struct Measured {
 }
 
 fn draw(args: &Args, inputs: &Inputs) -> anyhow::Result<Output> {
-    let backend = BackendChoice::among(compiled_backends!(), args.backend.as_deref());
+    let backend = BackendChoice::select(compiled_backends!(), args.backend.as_deref());
     let backend = backend.map_err(|error| Error::usage(error.to_string()))?;
     if !args.reference {
         backend.set_up()?;

@@ -58,7 +58,7 @@ fn stopped(error: anyhow::Error, again: &str) -> Failure {
 /// The requested backend, initialized; by default flex, the fastest on a CPU, if available.
 fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
     let asked = asked.or(cfg!(feature = "flex").then_some("flex"));
-    let backend = BackendChoice::among(compiled_backends!(), asked)
+    let backend = BackendChoice::select(compiled_backends!(), asked)
         .map_err(|error| Error::Usage(error.to_string()))?;
     backend.set_up()?;
     Ok(backend)
