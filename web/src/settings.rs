@@ -114,7 +114,7 @@ impl SoftnessChoice {
     ///
     /// If no softness has this name, or a width is out of range.
     pub fn of_task(&self, task: &str) -> anyhow::Result<ScheduledSoftness> {
-        // Masks use the softness learned on POSE without an adaptive schedule, which restarts from other starts, which masks have anyway.
+        // Masks use the softness learned on POSE without an adaptive schedule: they have other starts without its restarts.
         let (learned_on, preset) = if task == "mask" { ("pose", "pose") } else { (task, "") };
         let softness = match self.name.strip_prefix(LEARNED) {
             Some(name) => ScheduledSoftness::learned(name)?,

@@ -11,6 +11,9 @@ use crate::{
     task::{Ended, HARD, PARAMETER, theta_of},
 };
 
+/// Most pixels of an image: those of the largest square.
+const MOST_PIXELS: usize = 1 << 24;
+
 /// A task with a method to solve it.
 pub struct TaskExperiment<T: Task> {
     /// The task.
@@ -76,7 +79,13 @@ impl<T: Task> TaskExperiment<T> {
         }
         let usual = task.defaults();
         let size = common.size.unwrap_or(usual.size);
-        method.resolution.check(task.image_size(size)).map_err(Error::usage)?;
+        let image = task.image_size(size);
+        if image.pixels() > MOST_PIXELS {
+            return Err(Error::usage(format!(
+                "--size {size} draws {image} pixels: at most {MOST_PIXELS} fit"
+            )));
+        }
+        method.resolution.check(image).map_err(Error::usage)?;
         // With an adaptive schedule, the number of steps is tuned to the learning rate.
         let takes = task.takes_learning_rate() || method.softness.adaptive.is_some();
         let of_method = method.softness.learning_rate.filter(|_| takes);
@@ -137,6 +146,10 @@ impl<T: Task> TaskExperiment<T> {
         }
         if let Some(note) = &softness.note {
             set("softness_note", note.as_str().into());
+        }
+        let image = self.image_size();
+        if image != ImageSize::from(size) {
+            set("image_size", image.to_string().into());
         }
         settings
     }

@@ -161,5 +161,9 @@ mod tests {
         assert_eq!(enlarged(&few, 2.into(), 4.into())[..8], [many, many].concat());
         assert_eq!(enlarged(&few, 2.into(), 2.into()), few);
         assert_eq!(enlarged(&[few, few].concat(), 2.into(), 4.into()).len(), 32);
+        let wide = enlarged(&few[..2], [1, 2].into(), [2, 4].into());
+        assert_eq!(wide, [many, many].concat()[..8]);
+        let tall = enlarged(&few[..2], [2, 1].into(), [4, 2].into());
+        assert_eq!(tall, [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
     }
 }

@@ -130,7 +130,7 @@ impl<S: Softness> PhiLayout<S> {
         self.steps
     }
 
-    /// Width and height of the image, in pixels.
+    /// Shorter side of the image, in pixels.
     pub fn size(&self) -> usize {
         self.size
     }

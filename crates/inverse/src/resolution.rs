@@ -75,8 +75,8 @@ impl Resolution {
             Resolution::Side(side) if !sides.any(|known| known == side) => {
                 let sides = Self::sizes(full).map(|size| size.shorter().to_string());
                 Err(format!(
-                    "--resolution {side} is not what is left of --size {} by halving: expected full, auto or one of {}",
-                    full.shorter(),
+                    "--resolution {side} is not what halving leaves of an image of {full} pixels, while both sides are even: expected full, \
+                     auto or one of {}",
                     sides.collect::<Vec<_>>().join(", ")
                 ))
             }

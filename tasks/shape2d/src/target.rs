@@ -1,10 +1,26 @@
 use std::path::Path;
 
+use anyhow::ensure;
 use softrast_cli::Variant;
 use softrast_raster::ImageSize;
 use softrast_views::Picture;
 
 use crate::Logo;
+
+/// Largest ratio of the sides of a picture: images of thinner ones would not fit into memory.
+const MOST_LONG: usize = 16;
+
+/// Refuses a picture that is more than [`MOST_LONG`] times as long as wide.
+pub(crate) fn ensure_not_thin(picture: &Picture, path: &Path) -> anyhow::Result<()> {
+    let size = picture.size();
+    let longer = size.height.max(size.width);
+    ensure!(
+        longer <= MOST_LONG * size.shorter(),
+        "{}: a picture of {size} pixels is too thin: crop it until one side is at most {MOST_LONG} times the other",
+        path.display()
+    );
+    Ok(())
+}
 
 /// A picture to cover, at any size.
 pub(crate) struct Target {
@@ -31,10 +47,11 @@ impl Target {
     ///
     /// # Errors
     ///
-    /// If the file is missing or no picture.
+    /// If the file is missing, no picture, or too thin.
     pub(crate) fn load(path: &Path) -> anyhow::Result<Self> {
-        let source = Source::Picture(Picture::load_luminance(path)?);
-        Ok(Self { name: path.display().to_string(), source })
+        let picture = Picture::load_luminance(path)?;
+        ensure_not_thin(&picture, path)?;
+        Ok(Self { name: path.display().to_string(), source: Source::Picture(picture) })
     }
 
     pub(crate) fn name(&self) -> &str {

@@ -69,7 +69,8 @@ fn a_wide_picture_keeps_its_proportions() {
     let line = format!("--size 24 --triangles 40 --steps 20 --target {}", path.display());
     let json = run_in(out.path(), &format!("--colour {line}")).unwrap();
     let of = |key: &str| json["psnr"]["hard"][key].as_f64().unwrap();
-    assert!(of("initial") > 20.0 && of("best") >= of("initial"), "{json}");
+    assert!(of("initial") > 20.0 && of("best") > of("initial"), "{json}");
+    assert_eq!(json["settings"]["image_size"], "60 x 24", "{json}");
     let svg = fs::read_to_string(out.path().join("result.svg")).unwrap();
     assert!(svg.contains("viewBox=\"0 0 60 24\""), "{svg}");
     // Four pictures in a row, with gaps.
@@ -79,6 +80,24 @@ fn a_wide_picture_keeps_its_proportions() {
     assert_finite(&run_in(out.path(), &format!("{line} --resolution 6 --scale 0.1")).unwrap());
     let wrong = run_in(out.path(), &format!("{line} --resolution 3 --scale 0.1")).unwrap_err();
     assert!(wrong.to_string().contains("one of 24, 12, 6"), "{wrong}");
+}
+
+#[test]
+fn pictures_may_be_tall_but_neither_thin_nor_huge() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = |name: &str, width: u32, height: u32, more: &str| {
+        let path = folder.path().join(name);
+        RgbaImage::from_pixel(width, height, Rgba([200, 90, 20, 255])).save(&path).unwrap();
+        format!("--colour --triangles 9 --steps 2 {more} --target {}", path.display())
+    };
+    let out = tempfile::tempdir().unwrap();
+    run_in(out.path(), &line("tall.png", 3, 4, "--size 8")).unwrap();
+    let svg = fs::read_to_string(out.path().join("result.svg")).unwrap();
+    assert!(svg.contains("viewBox=\"0 0 8 11\""), "{svg}");
+    let thin = run(&line("thin.png", 1, 40, "--size 8")).unwrap_err().to_string();
+    assert!(thin.contains("thin.png: a picture of 1 x 40 pixels is too thin"), "{thin}");
+    let huge = run(&line("huge.png", 1, 16, "--size 4096")).unwrap_err().to_string();
+    assert!(huge.contains("--size 4096 draws 4096 x 65536 pixels"), "{huge}");
 }
 
 #[test]

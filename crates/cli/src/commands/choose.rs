@@ -188,8 +188,8 @@ fn with<T: Task>(of: &str, experiment: &TaskExperiment<T>) -> String {
     match of {
         "softness" => counted(experiment.parameters(), "parameter"),
         "resolution" => match method.resolution {
-            Resolution::Auto => format!("at most {} pixels a side", size.shorter()),
-            resolution => format!("{} pixels a side", resolution.size(size, 1.0).shorter()),
+            Resolution::Auto => format!("at most {size} pixels"),
+            resolution => format!("{} pixels", resolution.size(size, 1.0)),
         },
         "tolerance" => format!("pixels off by {:e}", method.tolerance()),
         _ => format!("{} faces", experiment.description.faces),

@@ -8,6 +8,8 @@ use super::Picture;
 
 /// Size of the view square relative to the white part of a mask.
 const MARGIN: f64 = 1.5;
+/// Largest change of the longer side of a picture for the sake of halving, relative to it.
+const MOST_ROUNDED: f64 = 0.01;
 
 impl Picture {
     /// The least square around the pixels that are at least half white, with its centre at theirs: left, top and extent in pixels. `None`
@@ -70,11 +72,20 @@ impl Picture {
         levels
     }
 
-    /// The size of this picture where its shorter side has `size` pixels; the longer one is rounded.
+    /// The size of this picture where its shorter side has `size` pixels. The longer one is rounded, by up to 1 % to a side that can be
+    /// halved three times, or as often as the shorter one.
     pub fn size_at(&self, size: usize) -> ImageSize {
         let own = self.size();
-        let side =
-            |long: usize| (long as f64 * size as f64 / own.shorter() as f64).round() as usize;
+        let side = |of: usize| {
+            let exact = of as f64 * size as f64 / own.shorter() as f64;
+            let rounded = |halvings: u32| {
+                let least = f64::from(1 << halvings);
+                (exact / least).round() * least
+            };
+            let is_near = |side: &f64| (side - exact).abs() <= MOST_ROUNDED * exact;
+            let coarse = (1..=size.trailing_zeros().min(3)).rev().map(rounded).find(is_near);
+            coarse.unwrap_or_else(|| rounded(0)) as usize
+        };
         [side(own.height), side(own.width)].into()
     }
 
@@ -180,6 +191,9 @@ mod tests {
         assert_close(&picture.resized(size), &[0.5, 0.25]);
         assert_close(&picture.resized(picture.size_at(2)), &picture.levels(4)[4..12]);
         assert_eq!(Picture::new(vec![0.0; 6], 3).size_at(5), [5, 8].into());
+        // Exactly 341.3 and 60.
+        assert_eq!(Picture::new(vec![0.0; 12], 4).size_at(256), [256, 344].into());
+        assert_eq!(Picture::new(vec![0.0; 10], 2).size_at(24), [60, 24].into());
     }
 
     #[test]

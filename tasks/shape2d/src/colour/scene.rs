@@ -125,7 +125,7 @@ impl<B: RasterBackend> Scene<B> {
         image.narrow(1, 0, 3)
     }
 
-    /// What a renderer draws at θ.
+    /// The inputs of a renderer at θ.
     fn inputs(
         &self,
         theta: Tensor<B, 1>,

@@ -16,6 +16,7 @@ use softrast_views::Picture;
 use crate::{
     Args, Shape2d,
     colour::{Colours, Scene, Start, landscape},
+    target::ensure_not_thin,
 };
 
 /// Least final PSNR of the hard image of a successful run.
@@ -135,7 +136,11 @@ impl Task for Coloured {
         let usual_triangles = Args::usual_triangles(variant);
         let (name, picture) = match &args.target {
             None => ("landscape".to_owned(), None),
-            Some(path) => (path.display().to_string(), Some(Picture::load_colours(path)?)),
+            Some(path) => {
+                let picture = Picture::load_colours(path)?;
+                ensure_not_thin(&picture[0], path)?;
+                (path.display().to_string(), Some(picture))
+            }
         };
         let triangles = args.triangles.unwrap_or(usual_triangles);
         Ok(Self { name, picture, sizes: RefCell::default(), triangles, usual_triangles })
