@@ -146,11 +146,13 @@ impl Elementary for Perspective {
                     let divided = depth.value() >= N::Float::from_f64(NEAR);
                     let through = if divided { x * to_x + y * to_y } else { zero };
                     let to_seen = [to_x, to_y, N::constant(u[2]) - through];
-                    for (i, to_row) in to_seen.into_iter().enumerate() {
-                        for j in 0..3 {
-                            part[4 * i + j] = part[4 * i + j] + to_row * at[j];
+                    if wanted[1] {
+                        for (i, to_row) in to_seen.into_iter().enumerate() {
+                            for j in 0..3 {
+                                part[4 * i + j] = part[4 * i + j] + to_row * at[j];
+                            }
+                            part[4 * i + 3] = part[4 * i + 3] + to_row;
                         }
-                        part[4 * i + 3] = part[4 * i + 3] + to_row;
                     }
                     if wanted[0] {
                         for j in 0..3 {
