@@ -59,7 +59,7 @@ impl CubicCurve {
     /// called if knots close to the edge are not enough. `far` holds octaves to try at the end of the support; empty for look-ups without
     /// them.
     pub(crate) fn chosen<B: Backend>(
-        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
+        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2],
         radii: [f64; 2],
         from: impl FnOnce() -> [f64; 2],
         far: &[u32],
@@ -113,7 +113,7 @@ impl CubicCurve {
     /// the second derivative.
     pub(crate) fn table<B: Backend>(
         &self,
-        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
+        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2],
         (device, dtype): (&B::Device, DType),
     ) -> Tensor<B, 2> {
         let knots = self.grid.knots();
@@ -140,26 +140,11 @@ impl CubicCurve {
             };
             SIGNS[side] * distance
         };
-        let of_sides = |sides: &[usize]| {
-            let at = |of: &dyn Fn(usize, f64) -> f64| {
-                constant(
-                    sides
-                        .iter()
-                        .flat_map(|&side| places.iter().map(move |&y| of(side, y)))
-                        .collect(),
-                )
-            };
-            curve(at(&nudged))
-        };
-        // A recorded op costs more than its few hundred numbers, so both sides are one tensor then. Otherwise each has a thread.
-        let sides = if B::ad_enabled(device) {
-            let both = of_sides(&[0, 1]);
-            [0, 1].map(|side| {
-                both.each_ref().map(|of| of.clone().narrow(0, side * places.len(), places.len()))
-            })
-        } else {
-            on_two_threads(|side| of_sides(&[side]))
-        };
+        let both = |side: usize| places.iter().map(move |&y| nudged(side, y));
+        let both = curve(constant([0, 1].into_iter().flat_map(both).collect()));
+        let sides = [0, 1].map(|side| {
+            both.each_ref().map(|of| of.clone().narrow(0, side * places.len(), places.len()))
+        });
 
         let mut rows = Vec::with_capacity(6);
         for (side, [value, slope]) in sides.into_iter().enumerate() {
@@ -198,7 +183,7 @@ impl CubicCurve {
     /// Values and cubics of a curve at these positions in each cell, and at smaller ones in the innermost.
     fn samples<B: Backend>(
         &self,
-        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
+        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2],
         places: &[f64],
         sums: DType,
         device: &B::Device,
@@ -252,23 +237,6 @@ struct Sample {
     interpolated: [f64; 2],
     /// Whether the position is in the innermost cell of its side.
     innermost: bool,
-}
-
-/// `of(0)` and `of(1)`, on two threads.
-///
-/// The second thread is not one of rayon's. A softness may compute its slope by autodiff, which waits for every graph of the process, and a
-/// backward pass holds its graph while it waits for a rayon thread: if all of these were in here, both would wait forever.
-fn on_two_threads<T: Send>(of: impl Fn(usize) -> T + Sync) -> [T; 2] {
-    std::thread::scope(|scope| {
-        let second = std::thread::Builder::new().spawn_scoped(scope, || of(1));
-        let first = of(0);
-        let second = match second {
-            Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
-            // A browser has one thread.
-            Err(_) => of(1),
-        };
-        [first, second]
-    })
 }
 
 /// Coefficients of cubics from these `values` to the `next`, replaced by straight lines where they miss them by more than a fraction of the
